@@ -10,9 +10,11 @@
 //! how pages quote it. `tests/suite/documents.rs` reads every page against its raw files.
 
 mod accuracy;
+mod animation;
 mod builds;
 mod closeup;
 mod diffusion;
+mod flicker;
 mod lab;
 mod light;
 mod lobes;
@@ -52,6 +54,7 @@ const FILES: &[(&str, Measure)] = &[
     ("docs/noise.json", accuracy::noise),
     ("docs/closeup.json", closeup::measure),
     ("docs/portrait.json", portrait::measure),
+    ("docs/animation.json", animation::measure),
     ("docs/page.json", page::measure),
     ("docs/window.json", window::software),
     ("docs/window_card.json", window::graphics_card),

@@ -13,6 +13,9 @@ use crate::robust::deviation;
 /// Reflectance of the usual grey card.
 pub const REFLECTANCE: f64 = 0.18;
 
+/// The share of a card's pixels that may be unseen: of a clipped border or a lamp's gloss.
+const MOST_UNSEEN: f64 = 0.1;
+
 /// What is wrong with a card.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum CardError {
@@ -40,6 +43,16 @@ pub enum CardError {
     /// The reflectance is not one.
     #[error("The card's reflectance is {0}. Give one above 0 and at most 1.")]
     Reflectance(f64),
+    /// Nothing is known of much of it.
+    #[error(
+        "No exposure sees {unseen} of the card's {pixels} pixels: they are clipped, or black, in all of them. Take one that sees the card, or give a rectangle that is seen."
+    )]
+    Unseen {
+        /// Pixels that no exposure sees.
+        unseen: usize,
+        /// Pixels of the rectangle.
+        pixels: usize,
+    },
     /// The card is black.
     #[error(
         "The card's radiance is {mean} in channel {channel}. Give a rectangle that is lit in all channels."
@@ -91,11 +104,18 @@ pub enum Normalise {
 
 /// Measures the card in `rectangle` of a picture of radiance; `reflectance` in (0, 1], usually [`REFLECTANCE`].
 ///
-/// A clipped card tells nothing, and radiance does not show it: look at the merge's counts.
+/// A clipped card tells nothing, and radiance does not show it: `seen` says how many exposures see each pixel, as
+/// [`Merged::seen`](crate::merge::Merged::seen) has it, and pixels that none sees are left out. Without it all count.
 ///
 /// # Errors
-/// A picture, a rectangle or a reflectance that is none, and a card without light in a channel.
-pub fn measure(picture: &Picture, rectangle: Rectangle, reflectance: f64) -> Result<Card, CardError> {
+/// A picture, a rectangle or a reflectance that is none, a card of which a tenth is not seen, and one without light in a
+/// channel.
+pub fn measure(
+    picture: &Picture,
+    seen: Option<&[u8]>,
+    rectangle: Rectangle,
+    reflectance: f64,
+) -> Result<Card, CardError> {
     picture.check()?;
     let Rectangle { x, y, width, height } = rectangle;
     let inside = |at: usize, size: usize, whole: usize| size > 0 && at < whole && size <= whole - at;
@@ -106,10 +126,10 @@ pub fn measure(picture: &Picture, rectangle: Rectangle, reflectance: f64) -> Res
     if !(reflectance > 0.0 && reflectance <= 1.0) {
         return Err(CardError::Reflectance(reflectance));
     }
+    let pixels = seen_pixels(picture, seen, rectangle)?;
     let (mut radiance, mut unevenness) = ([0.0; 3], 0f64);
     for c in 0..3 {
-        let rows = (y..y + height).map(|row| &picture.texels[row * picture.width + x..][..width]);
-        let mut values: Vec<f64> = rows.flatten().map(|rgb| f64::from(rgb[c])).collect();
+        let mut values: Vec<f64> = pixels.iter().map(|rgb| f64::from(rgb[c])).collect();
         values.sort_unstable_by(f64::total_cmp);
         // A letter or a finger on the card is in neither middle quarter.
         let middle = &values[values.len() / 4..values.len() - values.len() / 4];
@@ -129,6 +149,23 @@ pub fn measure(picture: &Picture, rectangle: Rectangle, reflectance: f64) -> Res
         exposure: radiance.map(|l| reflectance / l),
         white_balance: radiance.map(|l| grey / l),
     })
+}
+
+/// The pixels of a rectangle inside the picture that an exposure sees.
+fn seen_pixels(
+    picture: &Picture,
+    seen: Option<&[u8]>,
+    Rectangle { x, y, width, height }: Rectangle,
+) -> Result<Vec<[f32; 3]>, CardError> {
+    let places = (y..y + height).flat_map(|row| row * picture.width + x..row * picture.width + x + width);
+    let known = |i: &usize| seen.is_none_or(|seen| seen.get(*i).is_some_and(|count| *count > 0));
+    let known: Vec<[f32; 3]> = places.filter(known).map(|i| picture.texels[i]).collect();
+    let pixels = width * height;
+    let unseen = pixels - known.len();
+    if unseen as f64 > MOST_UNSEEN * pixels as f64 {
+        return Err(CardError::Unseen { unseen, pixels });
+    }
+    Ok(known)
 }
 
 /// Applies what a card tells. Radiance beyond f32 stays at its largest number.
@@ -163,32 +200,56 @@ mod tests {
     #[test]
     fn a_card_becomes_its_reflectance() {
         let (mut picture, rectangle) = room();
-        let card = measure(&picture, rectangle, REFLECTANCE).unwrap();
+        let card = measure(&picture, None, rectangle, REFLECTANCE).unwrap();
         for (got, truth) in card.radiance.into_iter().zip([0.4, 0.5, 0.2]) {
             // The letters pull the middle half down by a tenth of the noise's width.
             assert!((got / truth - 1.0).abs() < 0.005, "{got}");
         }
         let mut balanced = picture.clone();
         normalise(&mut balanced, &card, Normalise::WhiteBalance);
-        let [r, g, b] = measure(&balanced, rectangle, REFLECTANCE).unwrap().radiance;
+        let [r, g, b] = measure(&balanced, None, rectangle, REFLECTANCE).unwrap().radiance;
         let luminance = luminance(card.radiance);
         // Pixels are f32, each off by up to 3e-8 of itself.
         assert!((r - luminance).abs() < 1e-6 && (g - luminance).abs() < 1e-6 && (b - luminance).abs() < 1e-6);
         normalise(&mut picture, &card, Normalise::Exposure);
-        let exposed = measure(&picture, rectangle, REFLECTANCE).unwrap();
+        let exposed = measure(&picture, None, rectangle, REFLECTANCE).unwrap();
         assert!(exposed.radiance.iter().all(|l| (l - REFLECTANCE).abs() < 1e-6));
+    }
+
+    #[test]
+    fn what_no_exposure_sees_is_left_out_or_refused() {
+        let (mut picture, rectangle) = room();
+        let whole = measure(&picture, None, rectangle, REFLECTANCE).unwrap();
+        let mut seen = vec![2; picture.texels.len()];
+        let at = |i: usize| (12 + i / 10) * 40 + 20 + i % 10;
+        // Pixels that are clipped have the least radiance that they can be of, here none.
+        for i in 0..10 {
+            picture.texels[at(i)] = [0.0; 3];
+            seen[at(i)] = 0;
+        }
+        let card = measure(&picture, Some(&seen), rectangle, REFLECTANCE).unwrap();
+        for (got, want) in card.radiance.into_iter().zip(whole.radiance) {
+            // A tenth of the noise's width.
+            assert!((got / want - 1.0).abs() < 0.002, "{got} {want}");
+        }
+        seen[at(10)] = 0;
+        assert_eq!(
+            measure(&picture, Some(&seen), rectangle, REFLECTANCE),
+            Err(CardError::Unseen { unseen: 11, pixels: 100 })
+        );
     }
 
     #[test]
     fn wrong_cards_are_refused() {
         let (mut picture, rectangle) = room();
-        let wrong = |rectangle| matches!(measure(&room().0, rectangle, 0.18), Err(CardError::Outside { .. }));
+        let wrong =
+            |rectangle| matches!(measure(&room().0, None, rectangle, 0.18), Err(CardError::Outside { .. }));
         assert!(wrong(Rectangle { width: 0, ..rectangle }) && wrong(Rectangle { x: 31, ..rectangle }));
         assert!(wrong(Rectangle { y: usize::MAX, height: usize::MAX, ..rectangle }));
-        assert!(matches!(measure(&picture, rectangle, f64::NAN), Err(CardError::Reflectance(_))));
+        assert!(matches!(measure(&picture, None, rectangle, f64::NAN), Err(CardError::Reflectance(_))));
         picture.texels.fill([0.5, 0.0, 0.5]);
-        assert_eq!(measure(&picture, rectangle, 0.18), Err(CardError::Dark { channel: 1, mean: 0.0 }));
+        assert_eq!(measure(&picture, None, rectangle, 0.18), Err(CardError::Dark { channel: 1, mean: 0.0 }));
         picture.texels[0] = [f32::NAN; 3];
-        assert!(matches!(measure(&picture, rectangle, 0.18), Err(CardError::Picture(_))));
+        assert!(matches!(measure(&picture, None, rectangle, 0.18), Err(CardError::Picture(_))));
     }
 }

@@ -13,7 +13,7 @@ use skinfit::scene::lens::{Distortion, Lens};
 use skinfit::scene::view::Camera;
 use skinfit::scene::{LoadOptions, Scene};
 
-use crate::scene_folder::{SceneFolder, tampered};
+use crate::scene_folder::{SceneFolder, png, tampered};
 
 const MATRIX: &str = "world_to_camera = [1,0,0,0, 0,1,0,0, 0,0,1,-2, 0,0,0,1]";
 const FOV: &str = "fov_y_degrees = 30\n";
@@ -272,7 +272,7 @@ fn pose() -> DMat4 {
     DMat4::from_rotation_translation(DQuat::from_xyzw(x, y, z, w).normalize(), TRANSLATION.into())
 }
 
-fn write_text(folder: &Path) {
+pub(crate) fn write_text(folder: &Path) {
     let joined = |numbers: &[f64]| numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
     let mut cameras = "# Camera list with one line of data per camera:\n".to_owned();
     let mut images = "# Image list with two lines of data per image:\n".to_owned();
@@ -287,7 +287,7 @@ fn write_text(folder: &Path) {
     std::fs::write(folder.join("images.txt"), images).unwrap();
 }
 
-fn write_binary(folder: &Path) {
+pub(crate) fn write_binary(folder: &Path) {
     let (mut cameras, mut images) = (Vec::new(), Vec::new());
     let count = (MODELS.len() as u64).to_le_bytes();
     cameras.extend(count);
@@ -401,7 +401,7 @@ fn transforms_project_as_their_axes_have_it() {
         ],
     });
     std::fs::write(&path, whole.to_string()).unwrap();
-    let views = transforms::read(&path).unwrap();
+    let views = transforms::read(&path, None).unwrap();
     assert_eq!([&views[0].name, &views[1].name], ["a", "a_2"]);
     for (view, case) in views.iter().zip([MODELS[4], MODELS[5]]) {
         for point in points() {
@@ -410,12 +410,29 @@ fn transforms_project_as_their_axes_have_it() {
             assert!((px - x).hypot(py - y) < 1e-9, "{px} {py}, not {x} {y}");
         }
     }
-    // Blender's own exporters give an angle across, and no more.
+    // Exporters for Blender give an angle across.
     let plain = json!({"camera_angle_x": 0.8, "w": 640, "h": 480, "frames": [{"file_path": "./r_0", "transform_matrix": matrix}]});
     std::fs::write(&path, plain.to_string()).unwrap();
-    let camera = transforms::read(&path).unwrap()[0].camera;
+    let camera = transforms::read(&path, None).unwrap()[0].camera;
     assert_eq!(camera.lens, Lens::default());
     assert!((320.0 / (0.5 * camera.fov_y).tan() * 0.75 - 320.0 / 0.4_f64.tan()).abs() < 1e-9);
+    // Blender's NeRF files give no more than that: the pictures have the size.
+    let bare = json!({"camera_angle_x": 0.8, "frames": [{"file_path": "./r_0", "transform_matrix": matrix}]});
+    std::fs::write(&path, bare.to_string()).unwrap();
+    let told = transforms::read(&path, None).unwrap_err().to_string();
+    assert!(
+        told.contains("frame 0: has no w and h, and its picture ./r_0 is not there either. Add the width"),
+        "{told}"
+    );
+    for (name, images) in [("r_0.png", None), ("pictures/r_0.png", Some(folder.path().join("pictures")))] {
+        let file = folder.path().join(name);
+        std::fs::create_dir_all(file.parent().unwrap()).unwrap();
+        std::fs::write(&file, png(64, 48, [188; 3])).unwrap();
+        let sized = transforms::read(&path, images.as_deref()).unwrap()[0].camera;
+        assert_eq!([sized.width, sized.height], [64, 48]);
+        assert!((sized.fov_y - camera.fov_y).abs() < 1e-12);
+        std::fs::remove_file(file).unwrap();
+    }
     for (pointer, value, words) in [
         ("/frames/0/transform_matrix/0/0", json!(9.0), "has a transform_matrix that scales or shears"),
         ("/w", json!(640.5), "has an image of 0 x 480 pixels"),
@@ -425,7 +442,7 @@ fn transforms_project_as_their_axes_have_it() {
         let mut harmed = plain.clone();
         *harmed.pointer_mut(pointer).unwrap() = value;
         std::fs::write(&path, harmed.to_string()).unwrap();
-        let told = transforms::read(&path).unwrap_err().to_string();
+        let told = transforms::read(&path, None).unwrap_err().to_string();
         assert!(told.contains(words), "{told}");
     }
 }

@@ -217,8 +217,9 @@ fn hard_cases_are_finite_in_value_and_slope() {
         "roughness = 1\nf0 = 0.2\ngloss = 0.9",
         "roughness = 0.05\ngloss = 0.9\nf0 = 0.2",
     ];
-    for choices in CHOICES.into_iter().chain([TRACED]) {
-        for params in hard {
+    for (i, choices) in CHOICES.into_iter().chain([TRACED]).enumerate() {
+        // Two of them in turn.
+        for params in [hard[i % 3], hard[(i + 1) % 3]] {
             // A light's parameters are known once its scene was read.
             let observed = baked(&scene(choices, params)).sample().unwrap().observe().unwrap();
             let unknowns = moving(choices);

@@ -17,6 +17,7 @@ use skinfit::scene::view::Target;
 
 use crate::common;
 use crate::fixtures::quantile;
+use crate::graphics::bench::cache;
 use crate::graphics::bench::{EXACT, gpu};
 use crate::scene_folder::{SCENE, SceneFolder, exr};
 use crate::slopes;
@@ -34,7 +35,7 @@ pub(crate) fn param(name: &str) -> Param {
 pub(crate) fn calibration(name: &str) -> Option<Baked> {
     let path = common::data()?.join(format!("calib_lights/{name}.toml"));
     let effects = Some(Effects::of(&[Effect::Lights, Effect::Shadows]));
-    let options = PrepareOptions { fit: true, effects, ..PrepareOptions::default() };
+    let options = PrepareOptions { fit: true, effects, cache: Some(cache()), ..PrepareOptions::default() };
     let baked = Baked::new(&path, &options).unwrap();
     Some(baked.with_scene(|scene: &mut Scene| {
         scene.params.set(Param::BaseWeight, ALBEDO);

@@ -68,7 +68,7 @@ fn an_even_sky_is_as_bright_by_rays_as_by_lookups() {
 #[test]
 fn light_by_rays_is_the_integral_over_the_sky() {
     // Of a fit that moves the roughness three are traced, 0.2 and 0.7 among them; of another those that there are.
-    for (m, free) in [(0.4, false), (0.25, false), (0.2, true), (0.7, true), (0.3, true), (0.5, true)] {
+    for (m, free) in [(0.25, false), (0.2, true), (0.7, true), (0.5, true)] {
         for model in SpecularModel::ALL {
             by_rays_beside_integral(model, m, free);
         }
@@ -111,7 +111,7 @@ fn by_rays_beside_integral(model: SpecularModel, m: f64, free: bool) {
             let want = integral(&radiance, model, m, n, view);
             // 1024 rays, each of a blurred lookup, of a sky whose texels are 22 degrees wide; and between the roughnesses
             // that are traced the parabola, which a map of unevenly bright texels leaves by up to 5 in 100.
-            let most = if [0.3, 0.5].contains(&m) { 0.06 } else { 0.015 };
+            let most = if m == 0.5 { 0.06 } else { 0.015 };
             for c in 0..3 {
                 let error = (f64::from(rgb[c]) - want[c]).abs();
                 assert!(

@@ -10,8 +10,9 @@ use std::sync::LazyLock;
 use crate::{files, output};
 
 /// All that makes bakes of their inputs: another text may make others, so that old files are left alone.
-const SOURCES: [&str; 27] = [
+const SOURCES: [&str; 28] = [
     include_str!("baker.rs"),
+    include_str!("between.rs"),
     include_str!("cache.rs"),
     include_str!("coefficients.rs"),
     include_str!("harmonics.rs"),

@@ -230,7 +230,7 @@ mod tests {
     #[test]
     fn a_mesh_must_lie_in_the_atlas() {
         let uvs = [Vec2::new(0.5, 0.5), Vec2::new(1.5, -0.5)];
-        assert_eq!(overlap(&uvs, &[], 8).unwrap_err(), AtlasError::Outside { u: 1.0, v: -1.0 });
+        assert_eq!(overlap(&uvs, &[[0, 1, 0]], 8).unwrap_err(), AtlasError::Outside { u: 1.0, v: -1.0 });
         assert_eq!(overlap(&[], &[], 8).unwrap_err(), AtlasError::NoUvs);
     }
 

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use crate::bake::low_discrepancy::mix;
 use crate::bake::rays::RayMesh;
 use crate::scene::mesh::PosedMesh;
+use crate::scene::plain::{PlainMaterial, PlainParts};
 use crate::scene::view::Camera;
 
 /// A point of the mesh: a triangle, and the weights of its second and third vertex.
@@ -53,9 +54,9 @@ enum Shown {
     Plain(Hit),
 }
 
-/// Of so many layers that blend, one behind the other, the rest is not seen.
+/// Behind so many layers that blend only what is opaque is seen.
 const MOST_LAYERS: usize = 16;
-/// And of so many triangles with holes there.
+/// And behind so many triangles, those with holes there among them.
 const MOST_HOLES: usize = 256;
 
 /// A triangle as seen from the eye: rays from there hit it by three dot products.
@@ -234,7 +235,30 @@ fn shown(
         }
         passed.push(found.triangle);
     }
-    Shown::Nothing
+    opaque(rays, mesh, plain, (eye, d), hit)
+}
+
+/// The first of what lets nothing through, from `eye` along `d`: what many layers hide most of is no hole in what is behind
+/// them.
+fn opaque(
+    rays: &RayMesh,
+    mesh: &PosedMesh,
+    plain: &PlainParts,
+    (eye, d): (DVec3, DVec3),
+    hit: impl Fn(u32, DVec3) -> Option<(f64, [f64; 3])>,
+) -> Shown {
+    let whole = |triangle: u32, d: DVec3| {
+        let (distance, weights) = hit(triangle, d)?;
+        let [_, u, v] = weights.map(|weight| weight as f32);
+        let at = Hit { triangle, barycentric: [u, v] };
+        let seen = |material: &PlainMaterial| material.seen(at.uv(mesh), plain.tint(triangle, at.weights()));
+        plain.material(triangle).is_none_or(|material| seen(material) >= 1.0).then_some((distance, weights))
+    };
+    match nearest(rays, eye, d, whole) {
+        None => Shown::Nothing,
+        Some(found) if plain.material(found.triangle).is_some() => Shown::Plain(found),
+        Some(found) => Shown::Skin(found),
+    }
 }
 
 /// The nearest triangle from `eye` along `d`, by what `hit` says of a triangle and a unit direction.

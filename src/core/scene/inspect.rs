@@ -75,6 +75,8 @@ pub struct Material {
     pub color: Option<Picture>,
     /// Its normal map.
     pub normal: Option<Picture>,
+    /// Whether it has a picture of ambient occlusion, which nothing reads.
+    pub occlusion: bool,
 }
 
 /// A picture that a material names.

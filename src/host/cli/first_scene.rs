@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::Refusal;
 use crate::output;
 use crate::scene::draft::Draft;
+use crate::scene::images;
 use crate::scene::import::ImportedView;
 use crate::scene::inspect::{FilePicture, MeshContents, Picture};
 use crate::scene::view::Camera;
@@ -25,9 +26,7 @@ impl FirstScene<'_> {
     /// Write it; nothing that is there is written over.
     pub(super) fn write(self, contents: &MeshContents, scene: &Path) -> Result<(), Refusal> {
         free(scene)?;
-        if let Some(file) = self.environment.filter(|file| !file.is_file()) {
-            return Err(Refusal::new(format!("{}: is not there. Name a panorama.", file.display())));
-        }
+        self.environment.map_or(Ok(()), check_panorama)?;
         let folder = match scene.parent() {
             Some(folder) if folder != Path::new("") => folder,
             _ => Path::new("."),
@@ -73,6 +72,16 @@ impl FirstScene<'_> {
         output::write(scene, draft.text().as_bytes())?;
         Ok(())
     }
+}
+
+/// Refuse what no scene takes for a panorama: that is read as a scene would read it, before anything is written.
+fn check_panorama(file: &Path) -> Result<(), Refusal> {
+    if !file.is_file() {
+        return Err(Refusal::new(format!("{}: is not there. Name a panorama.", file.display())));
+    }
+    // What is doubtful about it is told whenever the scene is read.
+    images::color_map(file, &mut Vec::new())?;
+    Ok(())
 }
 
 /// Refuse to write over a file.

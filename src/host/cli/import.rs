@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::first_scene::FirstScene;
 use super::{Exit, Refusal, say, tell};
 use crate::scene::error::SceneError;
-use crate::scene::import::{ImportedView, colmap, metashape, opencv, transforms};
+use crate::scene::import::{ImportedView, colmap, metashape, opencv, picture_file, transforms};
 use crate::scene::inspect::MeshContents;
 use crate::scene::view::Camera;
 
@@ -44,11 +44,15 @@ enum Kind {
 }
 
 impl Kind {
-    /// The cameras that stand somewhere, or one that does not.
-    fn read(self, from: &Path) -> Result<(Vec<ImportedView>, Option<Camera>), SceneError> {
+    /// The cameras that stand somewhere, or one that does not; a picture's size may be asked for.
+    fn read(
+        self,
+        from: &Path,
+        images: Option<&Path>,
+    ) -> Result<(Vec<ImportedView>, Option<Camera>), SceneError> {
         match self {
             Self::Colmap => Ok((colmap::read(from)?, None)),
-            Self::Transforms => Ok((transforms::read(from)?, None)),
+            Self::Transforms => Ok((transforms::read(from, images)?, None)),
             Self::Metashape => Ok((metashape::read(from)?, None)),
             Self::Opencv => Ok((Vec::new(), Some(opencv::read(from)?))),
         }
@@ -57,7 +61,7 @@ impl Kind {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     let from = &arguments.from;
-    let (views, calibrated) = arguments.kind.read(from)?;
+    let (views, calibrated) = arguments.kind.read(from, arguments.images.as_deref())?;
     if calibrated.is_some() && arguments.images.is_some() {
         let from = from.display();
         return Err(Refusal::new(format!("{from}: a calibration names no pictures. Leave --images out.")));
@@ -82,22 +86,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
 
 /// The picture of a view, in the folder of pictures.
 fn target(folder: &Path, view: &ImportedView) -> Result<PathBuf, Refusal> {
-    let file = folder.join(&view.picture);
-    // transforms.json of Blender's own exporter leaves the ending out, and so do Metashape's labels, of files as cameras name
-    // them.
-    // A label may have a full stop, and no ending behind it.
-    let endings = ["png", "exr", "jpg", "jpeg", "hdr", "PNG", "JPG", "JPEG"].map(|ending| {
-        let mut name = file.clone().into_os_string();
-        name.push(".");
-        name.push(ending);
-        PathBuf::from(name)
-    });
-    let named = !view.picture.as_os_str().is_empty();
-    let tried = std::iter::once(file.clone()).chain(endings.into_iter().filter(|_| named));
-    tried.into_iter().find(|file| file.is_file()).ok_or_else(|| {
+    picture_file(folder, &view.picture).ok_or_else(|| {
         Refusal::new(format!(
             "{}: is not there. Name the folder of the pictures with --images, or leave it out.",
-            file.display()
+            folder.join(&view.picture).display()
         ))
     })
 }

@@ -172,6 +172,14 @@ fn not_read(contents: &MeshContents) -> String {
     if contents.materials.iter().any(|material| material.alpha != "opaque") {
         lines.push("alpha of materials that are skin: it is opaque".to_owned());
     }
+    let skin = contents.largest_material().map(|material| &material.name);
+    let mut others = contents.materials.iter().filter(|material| Some(&material.name) != skin);
+    if others.any(|material| material.normal.is_some()) {
+        lines.push("normal maps of materials that are not skin".to_owned());
+    }
+    if contents.materials.iter().any(|material| material.occlusion) {
+        lines.push("occlusion pictures of materials".to_owned());
+    }
     if contents.parts.iter().any(|part| part.vertex_colors) {
         lines.push("colours at vertices of skin".to_owned());
     }

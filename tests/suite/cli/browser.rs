@@ -8,7 +8,7 @@ use std::process::Command;
 use serde_json::Value;
 
 use super::sandbox::Sandbox;
-use super::tradeoffs::{AXES, done};
+use super::tradeoffs::done;
 
 /// The browser; none, said loudly, where it is left out on purpose.
 pub(super) fn browser() -> Option<&'static str> {
@@ -186,10 +186,13 @@ fn pages_work_in_a_browser() {
     let sandbox = Sandbox::new();
     sandbox.run(&["ablate", "scene.toml", "-o", "parts", "--gpu", "never", "--refit"]);
     sandbox.fit("run", &["--engine", "cpu"]).done();
+    // Of settings and of none, with times, bits and operations.
+    let axes = ["format", "irradiance", "rays", "samples", "solver"];
+    let options = axes.iter().flat_map(|axis| ["--axis", axis]).collect::<Vec<_>>();
     let goal = ["tradeoff", "scene.toml", "-o", "cost", "--params", "truth.toml", "--within", "1%"];
-    done(sandbox.run(&goal));
+    done(sandbox.run(&[&goal[..], &options].concat()));
     let cost = sandbox.path("cost/report.html");
-    let tables: Vec<String> = AXES.iter().map(|axis| format!("axis-{axis}")).collect();
+    let tables: Vec<String> = axes.iter().map(|axis| format!("axis-{axis}")).collect();
     let tables: Vec<&str> = std::iter::once("cheapest").chain(tables.iter().map(String::as_str)).collect();
     check(browser, &cost, &tables, false, true);
     let colours = screenshot(browser, &cost, "tradeoff_1100.png", 1100);

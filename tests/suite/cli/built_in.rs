@@ -1,36 +1,23 @@
 //! The scene that the program makes by itself.
 
-use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
+use std::path::Path;
 use std::time::Instant;
 
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use serde_json::Value;
 use skinfit::builtin;
-use skinfit::demo;
 use skinfit::render::files::{Image, ImageOptions, write_exr};
 
 use super::sandbox::{Ran, program};
 use crate::fixtures::read_exr;
-
-/// A folder with the built-in scene and its bakes, made once for all tests of this run.
-pub(crate) fn kept() -> &'static Path {
-    static KEPT: OnceLock<PathBuf> = OnceLock::new();
-    KEPT.get_or_init(|| {
-        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("built-in");
-        // An earlier run may have left another version's.
-        let _ = std::fs::remove_dir_all(&folder);
-        demo::kept_scene(&folder, Some(&folder)).unwrap();
-        folder
-    })
-}
+use crate::graphics::bench::{built_in, cache};
 
 #[test]
 fn a_bake_tells_of_the_morph_targets_that_have_a_weight() {
     let folder = tempfile::tempdir().unwrap();
-    let scene = kept().join(builtin::version()).join("scene.toml");
-    let mut command = program(kept());
+    let scene = built_in();
+    let mut command = program(&cache());
     Ran::of(command.arg("bake").arg(scene).args(["-o", "baked"]).current_dir(folder.path())).done();
     let table = std::fs::read_to_string(folder.path().join("baked/occlusion.csv")).unwrap();
     let mut lines = table.lines();
@@ -57,7 +44,7 @@ fn against_truth(report: &Value) -> Vec<(String, [f64; 3])> {
 #[test]
 fn a_fit_without_a_scene_finds_the_truth() {
     let folder = tempfile::tempdir().unwrap();
-    let ran = Ran::of(program(kept()).args(["fit", "--json"]).current_dir(folder.path())).done();
+    let ran = Ran::of(program(&cache()).args(["fit", "--json"]).current_dir(folder.path())).done();
     let report: Value = serde_json::from_str(&ran.out).unwrap();
     for (name, [value, error, truth]) in against_truth(&report) {
         crate::figures::measured("built-in constants", (value / truth - 1.0).abs());
@@ -83,7 +70,7 @@ fn a_fit_without_a_scene_finds_the_truth() {
 fn the_time_that_a_fit_tells_is_the_clocks() {
     let folder = tempfile::tempdir().unwrap();
     let clock = Instant::now();
-    let ran = Ran::of(program(kept()).arg("fit").current_dir(folder.path())).done();
+    let ran = Ran::of(program(&cache()).arg("fit").current_dir(folder.path())).done();
     let clock = clock.elapsed().as_secs_f64();
     let line = ran.out.lines().find(|line| line.starts_with("converged")).unwrap();
     // `...; 3.61 s, 1.55 s of them the fit's`
@@ -129,7 +116,8 @@ fn add_noise(from: &Path, to: &Path, share: f64, random: &mut StdRng) {
 
 #[test]
 fn with_noise_the_truth_lies_within_three_standard_errors() {
-    let scene = kept().join(builtin::version());
+    let file = built_in();
+    let scene = file.parent().unwrap();
     let folder = tempfile::tempdir().unwrap();
     let mut text = std::fs::read_to_string(scene.join("scene.toml")).unwrap();
     let mut random = StdRng::seed_from_u64(20);
@@ -142,7 +130,7 @@ fn with_noise_the_truth_lies_within_three_standard_errors() {
     }
     std::fs::write(folder.path().join("scene.toml"), text).unwrap();
     let fit = |loss: &str| {
-        let mut command = program(kept());
+        let mut command = program(&cache());
         command.args(["fit", "scene.toml", "--json", "--loss", loss]).current_dir(folder.path());
         let report: Value = serde_json::from_str(&Ran::of(&mut command).done().out).unwrap();
         against_truth(&report)

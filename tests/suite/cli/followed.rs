@@ -73,6 +73,34 @@ fn the_first_own_head() {
     let (_, shown) = blocks(&page).into_iter().find(|(kind, _)| kind == "text").unwrap();
     assert!(told.contains(shown.trim_end()), "{told}");
     assert!(told.contains("with fov_y_degrees = 25.0"), "{told}");
+    import_as_told(folder.path(), &page);
+}
+
+/// The program's line on a page that begins so, within single accents.
+fn line_of<'a>(page: &'a str, begins: &str) -> &'a str {
+    let at = page.find(&format!("`{begins}")).unwrap();
+    page[at + 1..].split('`').next().unwrap()
+}
+
+/// As `import` is told on the page: the scene file that earlier lines wrote is there.
+fn import_as_told(folder: &Path, page: &str) {
+    for kept in ["sparse/0", "images"] {
+        std::fs::create_dir_all(folder.join(kept)).unwrap();
+    }
+    std::fs::write(folder.join("sparse/0/cameras.txt"), "1 SIMPLE_PINHOLE 320 320 721.7 160 160\n").unwrap();
+    std::fs::write(folder.join("sparse/0/images.txt"), "1 0 1 0 0 0 0 0.75 1 front.exr\n\n").unwrap();
+    std::fs::copy(folder.join("own/targets/front.exr"), folder.join("images/front.exr")).unwrap();
+    let line = line_of(page, "skinfit import colmap");
+    let ran = shell(folder, line);
+    assert_eq!(ran.code, Some(0), "{line}: {}", ran.err);
+    let written = line.split_once(" -o ").unwrap().1;
+    assert!(ran.out.contains(&format!("wrote {written}: 1 view")), "{}", ran.out);
+    // What the other solvers' lines write is not what the page has written so far.
+    for line in
+        ["metashape", "transforms", "opencv"].map(|kind| line_of(page, &format!("skinfit import {kind}")))
+    {
+        assert!(line.ends_with(&format!(" -o {written}")), "{line}");
+    }
 }
 
 #[test]

@@ -128,7 +128,7 @@ fn lamps_beside_a_path_tracers_images_have_their_own_colours() {
         let old = text.lines().find(|line| line.starts_with(key)).unwrap().to_owned();
         text = text.replace(&old, &old.replace(held, &lamps));
     }
-    let sandbox = Sandbox::new();
+    let sandbox = Sandbox::with_shared_bakes();
     sandbox.write("studio.toml", text.as_bytes());
     assert_eq!(sandbox.run(&["fit", "studio.toml", "-o", "run", "--engine", "cpu"]).code, Some(0));
     let report = sandbox.json("run/report.json");

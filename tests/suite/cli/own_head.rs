@@ -83,7 +83,7 @@ fn what_the_file_says_of_itself_is_taken_over_and_the_rest_is_named() {
         json["textures"] = json!([{"source": 0}, {"source": 1}]);
         json["materials"] = json!([
             {"name": "Skin", "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}, "normalTexture": {"index": 1}},
-            {"name": "Lashes", "alphaMode": "BLEND", "extensions": {"KHR_materials_sheen": {}}},
+            {"name": "Lashes", "alphaMode": "BLEND", "normalTexture": {"index": 1}, "occlusionTexture": {"index": 0}, "extensions": {"KHR_materials_sheen": {}}},
         ]);
         json["meshes"][0]["primitives"][0]["material"] = json!(0);
         json["extensionsUsed"] = json!(["KHR_materials_sheen", "KHR_lights_punctual"]);
@@ -104,6 +104,8 @@ fn what_the_file_says_of_itself_is_taken_over_and_the_rest_is_named() {
         "cameras: Cam (34.4 degrees from top to bottom, at [0, 0, 5])",
         "not read:\n  materials, unless the scene names which are skin",
         "alpha of materials",
+        "normal maps of materials that are not skin",
+        "occlusion pictures of materials",
         "KHR_materials_sheen",
     ] {
         assert!(told.contains(words), "{words:?}: {told}");
@@ -128,6 +130,10 @@ fn meshes_that_cannot_be_read_are_refused() {
     sandbox
         .run(&["inspect", "mesh.glb", "-o", "made.toml", "--environment", "none.exr"])
         .refused(&["none.exr: is not there. Name a panorama."]);
+    sandbox.write("f.json", b"{}");
+    sandbox
+        .run(&["inspect", "mesh.glb", "-o", "made.toml", "--environment", "f.json"])
+        .refused(&["f.json: is not an image that can be read. Use OpenEXR"]);
     assert!(!sandbox.path("made.toml").exists());
 }
 
@@ -160,6 +166,10 @@ fn cameras_of_another_program_become_views_with_their_targets() {
     sandbox
         .run(&[&import[..], &["--images", "targets"]].concat())
         .refused(&["targets/lost.exr: is not there"]);
+    sandbox.write("sparse/cameras.txt", b"7 SIMPLE_RADIAL 32 32 40 16 16 -5\n");
+    sandbox.run(&import).refused(&[
+        "cameras.txt: line 1: has a lens that folds its image over, or sees 89 degrees from its axis, at pixel (0, 0)",
+    ]);
     sandbox
         .run(&["import", "colmap", "targets", "--mesh", "mesh.glb", "-o", "made.toml"])
         .refused(&["has neither cameras.bin nor cameras.txt"]);

@@ -52,7 +52,7 @@ fn a_page_draws_with_webgpu_and_fits_as_the_program_does() {
     if browser().is_none() {
         return;
     }
-    let sandbox = Sandbox::new();
+    let sandbox = Sandbox::with_shared_bakes();
     made(&sandbox);
     sandbox.run(&["fit", "-o", "run", "--engine", "cpu"]).done();
     let page = sandbox.path("page.html");
@@ -144,7 +144,7 @@ fn a_page_draws_without_webgpu_and_says_so() {
     if browser().is_none() {
         return;
     }
-    let sandbox = Sandbox::new();
+    let sandbox = Sandbox::with_shared_bakes();
     made(&sandbox);
     let page = sandbox.path("page.html");
     for (with, words, shot) in
@@ -246,7 +246,7 @@ fn a_fit_in_a_page_waits_ends_goes_on_and_leaves_views_out() {
     if browser().is_none() {
         return;
     }
-    let sandbox = Sandbox::new();
+    let sandbox = Sandbox::with_shared_bakes();
     made(&sandbox);
     let script = r##"
         await complete();

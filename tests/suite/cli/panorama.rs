@@ -2,8 +2,15 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use image::{ImageFormat, Rgb, RgbImage};
+#[path = "../../../src/panorama/tests/common/rendered.rs"]
+mod rendered;
 
+use glam::{DQuat, DVec2, DVec3};
+use image::{ImageFormat, Rgb, RgbImage};
+use skinfit_panorama::lens::{Fisheye, Lens, Projection};
+use skinfit_panorama::picture::Picture;
+
+use super::pinned::scene_text;
 use super::sandbox::Sandbox;
 use crate::common;
 use crate::fixtures::{quantile, read_exr};
@@ -96,6 +103,17 @@ fn a_recovered_response_is_a_views() {
     sandbox
         .run(&[&merge[..], &["--response", "recover", "--write-response", "merged.exr"]].concat())
         .refused(&["merged.exr is where the radiance goes"]);
+    sandbox
+        .run(
+            &[&merge[..], &["--response", "recover", "--write-response", "./targets/../merged.exr"]].concat(),
+        )
+        .refused(&["merged.exr is where the radiance goes"]);
+    // What is refused leaves nothing behind.
+    let card = ["--write-response", "other.csv", "--grey-card", "60,30,10,10"];
+    let refused = sandbox.run(&[&merge[..], &["--response", "recover"], &card].concat());
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+    assert!(refused.err.contains("leaves the picture of 64 x 32 pixels"), "{refused:?}");
+    assert!(!sandbox.path("other.csv").exists());
 }
 
 /// A grey photograph.
@@ -115,6 +133,66 @@ fn a_grey_card_sets_balance_and_exposure() {
     for channel in ["R", "G", "B"] {
         // To the 16 bits that such a picture has room for.
         assert!(planes.planes[channel].iter().all(|value| (value - 0.18).abs() < 2e-4), "{channel}");
+    }
+}
+
+#[test]
+fn a_card_that_is_clipped_in_every_photograph_is_refused() {
+    let sandbox = Sandbox::new();
+    sandbox.write("a.png", &photograph(255));
+    sandbox.write("b.png", &photograph(255));
+    sandbox
+        .run(&[
+            "panorama",
+            "merge",
+            "a.png",
+            "b.png",
+            "--seconds",
+            "1/4,1/2",
+            "--grey-card",
+            "2,2,8,8",
+            "-o",
+            "card.exr",
+        ])
+        .refused(&["No exposure sees 64 of the card's 64 pixels"]);
+    assert!(!sandbox.path("card.exr").exists());
+}
+
+/// A PNG file that says that its linear colours are of Display P3's primaries.
+fn of_p3(code: [u8; 3]) -> Vec<u8> {
+    let plain = encode(RgbImage::from_pixel(16, 12, Rgb(code)), ImageFormat::Png);
+    // Primaries, transfer, no matrix, all of the range (ITU-T H.273).
+    let chunk = [*b"cICP", [12, 13, 0, 1]].concat();
+    let mut crc = flate2::Crc::new();
+    crc.update(&chunk);
+    let chunk = [&4_u32.to_be_bytes()[..], &chunk, &crc.sum().to_be_bytes()].concat();
+    // Behind the signature and the header.
+    [&plain[..33], &chunk, &plain[33..]].concat()
+}
+
+#[test]
+fn radiance_is_of_rec709s_primaries_whatever_the_photographs_are_of() {
+    let sandbox = Sandbox::new();
+    sandbox.write("a.png", &of_p3([120, 60, 60]));
+    sandbox.write("b.png", &of_p3([160, 80, 80]));
+    sandbox.write("plain.png", &photograph(160));
+    let merge = |second: &str| {
+        let arguments = ["--seconds", "1,1", "--response", "gamma=1", "-o", "wide.exr"];
+        sandbox.run(&[&["panorama", "merge", "a.png", second], &arguments[..]].concat())
+    };
+    merge("plain.png").refused(&["plain.png: its colour profile has other primaries than that of a.png"]);
+    let ran = merge("a.png");
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    let planes = read_exr(&sandbox.path("wide.exr"));
+    // CSS Color 4: linear P3 to linear Rec.709.
+    let [r, g] = [120.0 / 255.0, 60.0 / 255.0];
+    let want = [1.224_94 * r - 0.224_94 * g, -0.042_06 * r + 1.042_06 * g, -0.019_64 * r + 1.019_63 * g];
+    for (channel, want) in ["R", "G", "B"].into_iter().zip(want) {
+        // To the 16 bits that such a picture has room for.
+        assert!(
+            planes.planes[channel].iter().all(|value| (f64::from(*value) - want).abs() < 1e-3),
+            "{channel}"
+        );
     }
 }
 
@@ -140,6 +218,72 @@ fn shots_of_an_even_room_become_an_even_panorama_that_a_scene_takes() {
     }
     sandbox.edit("env.exr", "sky.exr");
     sandbox.run(&["render", "scene.toml", "--engine", "cpu", "--view", "front", "-o", "lit.exr"]).done();
+}
+
+/// A picture's RGB planes.
+fn picture(file: &std::path::Path) -> Picture {
+    let planes = read_exr(file);
+    Picture { width: planes.width, height: planes.height, texels: planes.rgb(["R", "G", "B"]) }
+}
+
+/// Two fisheyes back to back, of which the second is told wrong and a little brighter: what their panorama makes of a
+/// fit.
+#[test]
+fn constants_fitted_under_stitched_light_are_those_under_the_true_one() {
+    let Some(data) = common::data() else { return };
+    let data = data.canonicalize().unwrap();
+    let world = picture(&data.join("env/forest.exr"));
+    let sandbox = Sandbox::with_shared_bakes();
+    const SIZE: usize = 1000;
+    let (centre, radius) = (DVec2::splat(500.0), 494.0);
+    let lens = Lens::Fisheye(Fisheye {
+        projection: Projection::Equidistant,
+        centre,
+        radius,
+        field_of_view_degrees: 200.0,
+    });
+    let first = DQuat::from_rotation_x(0.1) * DQuat::from_rotation_y(0.4);
+    let second = first * DQuat::from_rotation_y(std::f64::consts::PI);
+    let off = DQuat::from_axis_angle(DVec3::new(0.5, 0.7, -0.3).normalize(), 3_f64.to_radians());
+    let mut shots = String::new();
+    for (name, real, told, brighter) in [("a.exr", first, first, 1.0), ("b.exr", second, off * second, 1.07)]
+    {
+        let shot = rendered::shot(&world, &lens, real, SIZE);
+        sandbox.write_exr(name, SIZE, SIZE, |x, y| shot.texels[y * SIZE + x].map(|x| x * brighter));
+        let (towards, up) = ((told * DVec3::NEG_Z).to_array(), (told * DVec3::Y).to_array());
+        shots += &format!(
+            "[[shot]]\nfile = \"{name}\"\nlens = \"equidistant\"\ncentre = [{}, {}]\nradius = {radius}\n\
+             field_of_view_degrees = 200\ntowards = {towards:?}\nup = {up:?}\n",
+            centre.x, centre.y
+        );
+    }
+    sandbox.write("shots.toml", shots.as_bytes());
+    let ran = sandbox.run(&["panorama", "stitch", "shots.toml", "-o", "stitched.exr", "--width", "1024"]);
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    let truth = rendered::truth(&world, 1024);
+    sandbox.write_exr("true.exr", 1024, 512, |x, y| truth.texels[y * 1024 + x]);
+    let (size, signed) = rendered::error(&picture(&sandbox.path("stitched.exr")), &truth, |_| true);
+    // As the stitch's own tests have it.
+    assert!(size < 0.01, "{size} {signed}");
+    let fitted = |light: &str| {
+        let mut scene: toml::Table = scene_text(&data, "lps_forest").parse().unwrap();
+        scene["environment"]["file"] = sandbox.path(light).to_str().unwrap().into();
+        sandbox.write("forest.toml", scene.to_string().as_bytes());
+        let ran = sandbox.run(&["fit", "forest.toml", "-o", "run", "--engine", "cpu"]);
+        assert_eq!(ran.code, Some(0), "{}", ran.err);
+        let report = sandbox.json("run/report.json");
+        let unknown = |unknown: &serde_json::Value| {
+            (unknown["name"].as_str().unwrap().to_owned(), unknown["value"].as_f64().unwrap())
+        };
+        report["unknowns"].as_array().unwrap().iter().map(unknown).collect::<Vec<_>>()
+    };
+    let (want, got) = (fitted("true.exr"), fitted("stitched.exr"));
+    assert_eq!(got.len(), want.len());
+    for ((name, want), (_, got)) in want.iter().zip(&got) {
+        println!("{name}: {want} under the true light, {got} under the stitched one");
+        // What the radiance is held to.
+        assert!((got - want).abs() <= 0.01 * want.abs(), "{name}: {got} for {want}");
+    }
 }
 
 #[test]
@@ -170,6 +314,11 @@ fn what_is_no_photograph_or_no_shot_is_refused() {
     stitch(shot).refused(&["shots.toml: shot 0: has no field_of_view_degrees"]);
     stitch(&shot.replace("[0, 0, -1]", "[0, 1, 0]"))
         .refused(&["shot 0: towards and up are no two directions"]);
+    stitch(&format!("{shot}field_of_view_degrees = 180\ntrusted = 0.9\n")).refused(&[
+        "shots.toml: shot 0: trusted is a mirror ball's, and its lens is a fisheye. Leave it out",
+    ]);
+    stitch(&format!("{shot}field_of_view_degrees = 180\n").replace("equidistant", "mirror_ball"))
+        .refused(&["shot 0: field_of_view_degrees is a fisheye's, and its lens is a mirror ball"]);
     stitch(&format!("{shot}field_of_view_degrees = 900\n")).refused(&["900"]);
     stitch(&format!("{shot}field_of_view_degrees = 180\n").replace("env.exr", "none.exr"))
         .refused(&["none.exr"]);

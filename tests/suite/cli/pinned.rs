@@ -36,11 +36,10 @@ struct Pin {
 const BLOCKS: usize = 8;
 
 /// The scanned head's and the posed head's scenes by the paper's model.
-const PLAIN: [&str; 5] = ["lps_forest", "lps_sunrise", "lps_studio", "lps_studio_dry", "mh_portrait"];
+const PLAIN: [&str; 4] = ["lps_forest", "lps_sunrise", "lps_studio", "mh_portrait"];
 
-/// Files of scenes with more than that, from lights to diffusion.
-const WHOLE: [&str; 4] =
-    ["lps_forest/light.toml", "lps_studio/light.toml", "lps_forest/full.toml", "lps_studio/full.toml"];
+/// Files of scenes with more than that: with lights, and with diffusion.
+const WHOLE: [&str; 2] = ["lps_studio/light.toml", "lps_forest/full.toml"];
 
 /// A scene's text with its paths made absolute, without lamps and materials, which are not of the paper's model.
 pub(super) fn scene_text(data: &Path, scene: &str) -> String {

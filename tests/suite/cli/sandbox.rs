@@ -70,7 +70,9 @@ specular_lobe = 12.0
 /// A folder with the scene, and one for its bakes.
 pub(crate) struct Sandbox {
     folder: TempDir,
-    cache: TempDir,
+    cache: PathBuf,
+    /// The cache's folder, where it is of this sandbox alone.
+    _own: Option<TempDir>,
 }
 
 /// What the program said, and how it ended.
@@ -100,8 +102,14 @@ impl Sandbox {
         sandbox
     }
 
+    /// The same, with the bakes that all tests share: of scenes that others bake, too.
+    pub(crate) fn with_shared_bakes() -> Self {
+        Self { cache: crate::graphics::bench::cache(), _own: None, ..Self::new() }
+    }
+
     fn without_targets() -> Self {
-        let sandbox = Self { folder: tempfile::tempdir().unwrap(), cache: tempfile::tempdir().unwrap() };
+        let (folder, own) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let sandbox = Self { folder, cache: own.path().to_owned(), _own: Some(own) };
         sandbox.write("scene.toml", SCENE.as_bytes());
         sandbox.write("truth.toml", TRUTH.as_bytes());
         sandbox.write("mesh.glb", &mesh(|_, _| {}));
@@ -186,12 +194,12 @@ impl Sandbox {
     }
 
     pub(crate) fn cache(&self) -> &Path {
-        self.cache.path()
+        &self.cache
     }
 
     /// The program on `arguments`, in the scene's folder.
     pub(crate) fn command(&self, arguments: &[&str]) -> Command {
-        let mut command = program(self.cache.path());
+        let mut command = program(&self.cache);
         command.args(arguments).current_dir(self.folder.path());
         command
     }

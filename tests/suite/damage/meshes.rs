@@ -9,12 +9,20 @@ use super::tree::{json_text, tree_damage};
 use super::{check_outcome, damage, throw};
 use crate::scene_folder::{SCENE, SceneFolder, exr, quad_parts};
 
-/// A quad with two bones, two morph targets (one of sparse normals), and an animation of all three kinds of
-/// interpolation; its buffer is a file of its own.
+/// A quad with two bones, two morph targets (one of sparse normals), an animation of all three kinds of interpolation, and
+/// cameras, one of which stands on a bone; its buffer is a file of its own.
 fn moving() -> (Value, Vec<u8>) {
     let (mut json, mut bin) = quad_parts();
     json["nodes"] = json!([{"mesh": 0, "skin": 0}, {"translation": [0, 3, 0]}, {"scale": [1, 2, 1]}]);
-    json["scenes"][0]["nodes"] = json!([0, 1, 2]);
+    let nodes = json["nodes"].as_array_mut().unwrap();
+    nodes.push(json!({"name": "Still", "camera": 0, "translation": [0, 0, 2]}));
+    nodes.push(json!({"name": "Moved", "camera": 1, "rotation": [0, 1, 0, 0]}));
+    json["nodes"][1]["children"] = json!([4]);
+    json["cameras"] = json!([
+        {"type": "perspective", "perspective": {"yfov": 0.5, "znear": 0.1, "aspectRatio": 1.0}},
+        {"type": "perspective", "perspective": {"yfov": 0.7, "znear": 0.1, "zfar": 9.0}},
+    ]);
+    json["scenes"][0]["nodes"] = json!([0, 1, 2, 3]);
     json["skins"] = json!([{"joints": [1, 2]}]);
     let attributes = json["meshes"][0]["primitives"][0]["attributes"].as_object_mut().unwrap();
     attributes.insert("WEIGHTS_0".into(), json!(3));
@@ -71,15 +79,22 @@ fn folder() -> SceneFolder {
     folder.write("quad.bin", &bin);
     let text = SCENE.replacen("file = \"quad.glb\"", "file = \"quad.glb\"\ntime = 0.5", 1);
     let text = text.replacen("target = \"target.exr\"", "target = \"target.exr\"\nmask = \"mask.png\"", 1);
+    let view =
+        |name: &str| format!("[[view]]\nname = \"{name}\"\ncamera = \"{name}\"\nwidth = 4\nheight = 4\n");
+    let text = text.replacen("[fit]", &format!("{}{}[fit]", view("Still"), view("Moved")), 1);
     folder.write("scene.toml", text.as_bytes());
     folder
 }
 
-/// As [`check_outcome`], and whatever is there of the animation at any time, and of the mask.
+/// As [`check_outcome`], and whatever is there of the animation at any time, of the cameras and of the mask.
 fn check_all(outcome: Result<(Scene, Vec<Warning>), SceneError>) -> Result<(), TestCaseError> {
     if let Ok((scene, _)) = &outcome {
         let masks = scene.views.iter().filter_map(|view| view.target.as_ref()?.mask.as_ref());
         prop_assert!(masks.flatten().all(|weight| (0.0..=1.0).contains(weight)));
+        for camera in scene.views.iter().map(|view| view.camera) {
+            prop_assert!(camera.world_to_camera.is_finite(), "{camera:?}");
+            prop_assert!(camera.fov_y > 0.0 && camera.fov_y < std::f64::consts::PI, "{camera:?}");
+        }
         let paragraph = |error: SceneError| prop_assert_one_paragraph(&error);
         match Animation::open(scene) {
             Err(error) => paragraph(error)?,
@@ -114,6 +129,7 @@ fn the_moving_mesh_is_read_when_it_is_whole() {
     let folder = folder();
     let (scene, warnings) = folder.load().unwrap();
     assert_eq!((scene.mesh.morphs.len(), scene.mesh.bones.len()), (2, 2), "{warnings:?}");
+    assert_eq!(scene.views.len(), 3);
     let animation = Animation::open(&scene).unwrap().unwrap();
     assert_eq!(animation.seconds, (0.0, 1.0));
     assert!(scene.views[0].target.as_ref().unwrap().mask.is_some());

@@ -1,4 +1,4 @@
-//! Exported GLSL in place of the renderer's own fragment stage: the same pixels.
+//! Exported GLSL, and Unreal's node, in place of the renderer's own fragment stage: the same pixels.
 
 use std::process::Command;
 
@@ -9,11 +9,13 @@ use skinfit::model::texture_filter::TextureFilter;
 use skinfit::prepare::Baked;
 use skinfit::render::antialias::Antialias;
 use skinfit::render::shading::Shading;
+use skinfit::shader::facts::MapFacts;
 use skinfit::shader::quantity::Kind;
 use skinfit::shader::{Budget, Facts, Plan, plan};
 
 use super::bench::*;
 use crate::exports::{glsl_kind, provenance};
+use crate::unreal::Custom;
 
 /// A fragment shader of exported GLSL for the renderer's bindings, which keep textures and samplers apart.
 fn shader(plan: &Plan, params: &Params) -> String {
@@ -55,15 +57,59 @@ fn shader(plan: &Plan, params: &Params) -> String {
     )
 }
 
+/// A fragment shader of Unreal's node for the renderer's bindings. It is handed what Unreal's importer and nodes would make of
+/// what the renderer's vertex stage hands over.
+fn unreal_shader(plan: &Plan, params: &Params) -> String {
+    let custom = Custom::of(&export::material(Target::Unreal, &plan.facts, params, "Skin").unwrap());
+    let mut text = custom.function();
+    text += "[[vk::binding(0, 0)]] cbuffer Frame { float4 eye; };\n";
+    for (i, resource) in plan.resources.iter().enumerate() {
+        let name = format!("skinfit_{}", resource.name());
+        let (kind, sampler) = match resource.kind() {
+            Kind::Cube => ("TextureCube", "skinfit_cube_sampler"),
+            Kind::Map => ("Texture2D", "skinfit_map_sampler"),
+            Kind::Sampler => ("SamplerState", ""),
+            // The vertex stage's.
+            Kind::Storage => continue,
+            other => panic!("{name} is {other:?}: no export reads that"),
+        };
+        text += &format!("[[vk::binding({}, 0)]] {kind} bound_{name};\n", i + 1);
+        if !sampler.is_empty() {
+            text += &format!("#define bound_{name}Sampler bound_{sampler}\n");
+        }
+    }
+    let kind = |wgsl: &str| match wgsl {
+        "f32" => "float",
+        "vec2f" => "float2",
+        _ => "float3",
+    };
+    let fields = plan.varyings.iter().enumerate();
+    let fields: Vec<String> = fields
+        .map(|(i, (name, wgsl))| format!("[[vk::location({i})]] {} in_{name} : TEXCOORD{i}", kind(wgsl)))
+        .collect();
+    let given = |name: &str| match name {
+        "vertex_position" => "100.0 * (in_vertex_position - eye.xyz).xzy".to_owned(),
+        "vertex_bitangent" => "-in_vertex_bitangent.xzy".to_owned(),
+        "vertex_normal" | "vertex_tangent" => format!("in_{name}.xzy"),
+        "vertex_occlusion" => "float2(in_vertex_occlusion, 0.0)".to_owned(),
+        name => format!("in_{name}"),
+    };
+    format!("{text}float4 main({}) : SV_Target0 {{\n{}}}\n", fields.join(", "), custom.call(given))
+}
+
 /// GLSL by way of glslang and SPIR-V as WGSL.
 pub(crate) fn as_wgsl(glsl: &str) -> String {
+    compiled(&["-V", "-S", "frag"], glsl)
+}
+
+/// What glslang takes with those arguments, by way of SPIR-V as WGSL.
+fn compiled(arguments: &[&str], text: &str) -> String {
     let folder = tempfile::tempdir().unwrap();
     let (file, spirv) = (folder.path().join("shader.frag"), folder.path().join("shader.spv"));
-    std::fs::write(&file, glsl).unwrap();
-    let output =
-        Command::new("glslangValidator").args(["-V", "-S", "frag", "-o"]).args([&spirv, &file]).output();
+    std::fs::write(&file, text).unwrap();
+    let output = Command::new("glslangValidator").args(arguments).arg("-o").args([&spirv, &file]).output();
     let output = output.expect("glslangValidator (Debian: glslang-tools) cannot be run");
-    assert!(output.status.success(), "{}\n{glsl}", String::from_utf8_lossy(&output.stdout));
+    assert!(output.status.success(), "{}\n{text}", String::from_utf8_lossy(&output.stdout));
     let options = naga::front::spv::Options::default();
     let module = naga::front::spv::parse_u8_slice(&std::fs::read(&spirv).unwrap(), &options).unwrap();
     let info =
@@ -75,16 +121,37 @@ pub(crate) fn as_wgsl(glsl: &str) -> String {
 
 #[test]
 fn exported_glsl_draws_the_pixels_of_the_renderers_own_shader() {
+    let single = |facts: Facts| Facts { f16: false, ..facts };
+    compare_filters(&single, &|plan, params| as_wgsl(&shader(plan, params)));
+}
+
+/// What the renderer's interpolation saves an engine's own mesh may be too coarse for, so that no export does it.
+#[test]
+fn unreals_node_draws_the_pixels_of_the_renderers_own_shader() {
+    // A material names a picture for each map.
+    let apart = |maps: MapFacts| MapFacts { color_specular: false, normal_attenuator: false, ..maps };
+    let single = |facts: Facts| Facts { f16: false, tessellation: 1.0, maps: apart(facts.maps), ..facts };
+    let hlsl = ["-D", "-V", "-S", "frag", "-e", "main"];
+    compare_filters(&single, &|plan, params| compiled(&hlsl, &unreal_shader(plan, params)));
+}
+
+/// With each filter of maps: `single` are the facts that both plan with, as exports have no 16-bit arithmetic; `fragment` makes
+/// the stage as WGSL.
+fn compare_filters(single: &dyn Fn(Facts) -> Facts, fragment: &dyn Fn(&Plan, &Params) -> String) {
     let Some(gpu) = gpu() else { return };
     for filter in TextureFilter::ALL {
-        compare(
-            gpu,
-            &baked(&built_in(), SURFACE, 128).with_scene(|scene| scene.quality.texture_filter = filter),
-        );
+        let baked =
+            baked(&built_in(), SURFACE, 128).with_scene(|scene| scene.quality.texture_filter = filter);
+        compare(gpu, &baked, single, fragment);
     }
 }
 
-fn compare(gpu: &Gpu, baked: &Baked) {
+fn compare(
+    gpu: &Gpu,
+    baked: &Baked,
+    single: &dyn Fn(Facts) -> Facts,
+    fragment: &dyn Fn(&Plan, &Params) -> String,
+) {
     let params = baked.scene.params.clone();
     let camera = baked.scene.views[0].camera;
     let options = RenderOptions {
@@ -97,13 +164,12 @@ fn compare(gpu: &Gpu, baked: &Baked) {
         let mut renderer = Renderer::with_shader(gpu, Content::of(baked), options, change).unwrap();
         renderer.render(&camera, 1.0).unwrap().image
     };
-    // Exports have no 16-bit arithmetic.
-    let single = |planned: &Plan| plan(&Facts { f16: false, ..planned.facts }).unwrap();
+    let single = |planned: &Plan| plan(&single(planned.facts)).unwrap();
     let ours = draw(&single);
     let exported = draw(&|planned: &Plan| {
         let plan = single(planned);
         let vertex = plan.wgsl.split("\n@fragment\n").next().unwrap();
-        let fragment = as_wgsl(&shader(&plan, &params)).replace("fn main(", "fn fs_main(");
+        let fragment = fragment(&plan, &params).replace("fn main(", "fn fs_main(");
         Plan { wgsl: format!("{vertex}\n{fragment}"), ..plan }
     });
     assert_eq!(ours.alpha, exported.alpha);

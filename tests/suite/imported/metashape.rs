@@ -101,7 +101,7 @@ fn rows(matrix: DMat3) -> String {
 const LENSES: [Agisoft; 3] = [FRAME, FISHEYE, PLAIN];
 
 /// A file of as many cameras as lenses, one that is not aligned, and one that is disabled.
-fn metashape_file() -> String {
+pub(crate) fn metashape_file() -> String {
     let Stand { scale, rotation, translation } = stand();
     let mut text = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<document version=\"2.0.0\">\n\
                     <chunk label=\"Chunk 1\" enabled=\"true\">\n<sensors next_id=\"3\">\n"

@@ -2,8 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may stop where the tests themselves would")]
 
-mod metashape;
-mod opencv;
+pub(crate) mod metashape;
+pub(crate) mod opencv;
 
 use std::path::PathBuf;
 

@@ -47,7 +47,7 @@ fn check_opencv(text: &str, fisheye: bool) {
 }
 
 /// As OpenCV's sample of camera calibration writes it.
-const STORED: &str = "%YAML:1.0
+pub(crate) const STORED: &str = "%YAML:1.0
 ---
 calibration_time: \"Thu 01 Jan 2026 10:00:00 AM UTC\"
 nr_of_frames: 25
@@ -85,7 +85,7 @@ extrinsic_parameters:
       data: [ 1., 2., 3., 4.,
           5., 6. ]
 ";
-const ROS: &str = "image_width: 1280
+pub(crate) const ROS: &str = "image_width: 1280
 image_height: 720
 camera_name: head
 camera_matrix:
@@ -135,7 +135,7 @@ roi:
   width: 0
 ---
 ";
-const XML: &str = "<?xml version=\"1.0\"?>
+pub(crate) const XML: &str = "<?xml version=\"1.0\"?>
 <opencv_storage>
 <calibration_time>\"Thu 01 Jan 2026\"</calibration_time>
 <!-- of the head's camera -->

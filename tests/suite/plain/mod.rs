@@ -13,6 +13,7 @@ use skinfit::render::image::Image;
 use skinfit::render::shade::Shader;
 
 use crate::common;
+use crate::graphics::bench::cache;
 use crate::scene_folder::{SceneFolder, exr, glb, png, quad_parts};
 
 const SCENE: &str = r#"
@@ -184,7 +185,7 @@ fn names_that_nothing_has_are_refused() {
 #[test]
 fn the_eyes_of_a_path_traced_head_are_not_skin() {
     let Some(data) = common::data() else { return };
-    let options = PrepareOptions { fit: true, ..PrepareOptions::default() };
+    let options = PrepareOptions { fit: true, cache: Some(cache()), ..PrepareOptions::default() };
     let observed = Baked::new(&data.join("mh_portrait/scene.toml"), &options)
         .unwrap()
         .sample()

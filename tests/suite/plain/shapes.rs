@@ -44,19 +44,30 @@ fn a_coarse_closed_part_is_lit_to_its_silhouette() {
     }
 }
 
+/// Forty of the eye, one behind the other: more than the layers that blend at most.
+fn stacked(mesh: &mut Value, _: &mut Vec<u8>) {
+    let nodes: Vec<Value> = (0..40)
+        .map(|i| json!({"mesh": 1, "scale": [0.5, 0.5, 0.5], "translation": [0, 0, 0.1 + 0.01 * f64::from(i)]}))
+        .collect();
+    mesh["nodes"] = std::iter::once(json!({"mesh": 0})).chain(nodes).collect();
+    mesh["scenes"][0]["nodes"] = (0..41).collect();
+}
+
 #[test]
 fn holes_behind_holes_hide_nothing() {
     let net = json!({"name": "Eye", "alphaMode": "MASK", "pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 0.2]}});
-    let folder = edited(&net, SCENE, |mesh, _| {
-        // More than the layers that blend at most.
-        let nodes: Vec<Value> = (0..40)
-            .map(|i| json!({"mesh": 1, "scale": [0.5, 0.5, 0.5], "translation": [0, 0, 0.1 + 0.01 * f64::from(i)]}))
-            .collect();
-        mesh["nodes"] = std::iter::once(json!({"mesh": 0})).chain(nodes).collect();
-        mesh["scenes"][0]["nodes"] = (0..41).collect();
-    });
-    let middle = image(&sampled(&folder)).rgb[8 * 16 + 8];
+    let middle = image(&sampled(&edited(&net, SCENE, stacked))).rgb[8 * 16 + 8];
     assert!((middle[0] - 1.0).abs() < 1e-3, "{middle:?}");
+}
+
+#[test]
+fn behind_many_layers_the_skin_is_no_hole() {
+    let veil = json!({"name": "Eye", "alphaMode": "BLEND", "pbrMetallicRoughness": {
+        "metallicFactor": 1, "roughnessFactor": 0, "baseColorFactor": [0, 0, 0, 0.02]}});
+    let image = image(&sampled(&edited(&veil, SCENE, stacked)));
+    let (middle, alpha) = (image.rgb[8 * 16 + 8], image.alpha[8 * 16 + 8]);
+    // Sixteen layers hold back 28 of 100: one of the four rays ends at them, the others at the white skin.
+    assert!((middle[0] - 0.75).abs() < 1e-3 && (alpha - 1.0).abs() < 1e-6, "{middle:?} {alpha}");
 }
 
 #[test]

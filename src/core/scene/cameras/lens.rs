@@ -84,7 +84,7 @@ fn distortion(source: &Source, lens: &LensTable) -> Result<Option<Distortion>, S
 }
 
 /// A place of the image, in whole pixels, that no light meets: tried on a grid that has the borders.
-fn first_unlit(camera: &Camera) -> Option<(u32, u32)> {
+pub(in crate::scene) fn first_unlit(camera: &Camera) -> Option<(u32, u32)> {
     let at = |step: u32, pixels: u32| f64::from(step) / f64::from(STEPS) * f64::from(pixels);
     let places = (0..=STEPS).flat_map(|j| (0..=STEPS).map(move |i| (i, j)));
     let mut unlit = places.map(|(i, j)| (at(i, camera.width), at(j, camera.height)));

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use glam::DMat4;
 use toml::Spanned;
 
-pub(super) use self::lens::{LARGEST_COEFFICIENT, MOST_RATIO};
+pub(super) use self::lens::{LARGEST_COEFFICIENT, MOST_RATIO, first_unlit};
 pub(super) use self::place::{MeshCameras, all_finite, turns_alone};
 
 use self::lens::{check_coefficients, with_lens};

@@ -96,6 +96,7 @@ impl Document {
                 },
                 color: picture(color)?,
                 normal: picture(normal)?,
+                occlusion: material.occlusion_texture.is_some(),
             });
         }
         Ok(materials)

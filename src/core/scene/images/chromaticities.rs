@@ -10,7 +10,7 @@ pub(super) struct Chromaticities {
 }
 
 /// ITU-R BT.709, whose primaries and white sRGB shares.
-const REC709: Chromaticities = Chromaticities {
+pub(super) const REC709: Chromaticities = Chromaticities {
     primaries: [DVec2::new(0.64, 0.33), DVec2::new(0.30, 0.60), DVec2::new(0.15, 0.06)],
     white: DVec2::new(0.3127, 0.3290),
 };
@@ -43,6 +43,19 @@ impl Chromaticities {
         let adapt = BRADFORD.inverse() * DMat3::from_diagonal(there / here) * BRADFORD;
         let matrix = to.inverse() * adapt * from;
         if matrix.is_finite() { Ok(Some(matrix)) } else { Err("chromaticities that no colours have") }
+    }
+
+    /// How much of the luminance of white is red's, green's and blue's (`computeYw` in OpenEXR's `ImfRgbaYca.cpp`).
+    ///
+    /// # Errors
+    /// What is wrong with them, where green has none, by which it is found from luminance.
+    pub(super) fn luminance(self) -> Result<[f64; 3], &'static str> {
+        let shares = self.to_xyz()?.row(1);
+        if shares.is_finite() && shares.y.abs() > 1e-3 {
+            Ok(shares.to_array())
+        } else {
+            Err("a green without light")
+        }
     }
 
     /// To CIE XYZ, in which equal shares have Y = 1 (SMPTE RP 177-1993).
@@ -129,6 +142,18 @@ mod tests {
         assert_eq!(REC709.to_rec709(), Ok(None));
         let rounded = of([[0.6401, 0.3300], [0.3, 0.6], [0.15, 0.0600]], [0.31270, 0.32902]);
         assert_eq!(rounded.to_rec709(), Ok(None));
+    }
+
+    #[test]
+    fn luminance_has_the_published_shares() {
+        // ITU-R BT.709-6, item 3.2, and BT.2020-2, table 4, to their four digits.
+        let bt2020 = of([[0.708, 0.292], [0.170, 0.797], [0.131, 0.046]], [0.3127, 0.3290]);
+        for (space, want) in [(REC709, [0.2126, 0.7152, 0.0722]), (bt2020, [0.2627, 0.6780, 0.0593])] {
+            let off = DVec3::from(space.luminance().unwrap()) - DVec3::from(want);
+            assert!(off.abs().max_element() < 1e-4, "{off} off {want:?}");
+        }
+        let of_red = of([[0.64, 0.33], [0.3, 0.0], [0.15, 0.06]], [0.3127, 0.3290]);
+        assert!(of_red.luminance().is_err());
     }
 
     #[test]

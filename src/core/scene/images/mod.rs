@@ -1,6 +1,6 @@
 //! Image files as linear numbers: OpenEXR, Radiance HDR, PNG and JPEG.
 //!
-//! - `open_exr`, `raster`: the decoders
+//! - `open_exr`, `raster`: the decoders; `sampled`, `chroma` and `dwa` are parts of the former
 //! - `chromaticities`: other primaries than Rec.709's
 //! - `claims`: what PNG and JPEG files say of their colours; `code_points` and `icc` read it, `space` is what comes of it
 //! - `response`: a camera's own curve, where a view has one
@@ -9,9 +9,11 @@
 //! Files are told apart by their content. Colours in 8 or 16 bits are sRGB's where the file says nothing else; data maps are
 //! taken as they are; EXR and HDR are linear. Sizes are checked before anything is allocated.
 
+mod chroma;
 mod chromaticities;
 mod claims;
 mod code_points;
+mod dwa;
 mod icc;
 #[cfg(test)]
 mod luminance;
@@ -20,12 +22,13 @@ mod open_exr;
 mod profiled;
 mod raster;
 mod response;
+mod sampled;
 mod space;
 mod target;
 
 use std::path::Path;
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 use self::chromaticities::Chromaticities;
@@ -226,6 +229,29 @@ pub fn color_map(path: &Path, warnings: &mut Vec<Warning>) -> Result<Map<3>, Sce
     let mut image = read_colors(path, None, warnings)?;
     image.linearize();
     Ok(image.into_map())
+}
+
+/// An image's width and height.
+pub(super) fn size_of(path: &Path) -> Result<[u32; 2], SceneError> {
+    let bytes = read_bytes(path, MOST_BYTES)?;
+    guarded(path, || {
+        let opened = Opened { path, bytes: &bytes, size: None };
+        match raster::size(opened)? {
+            Some(size) => Ok(size),
+            None => decode(opened).map(|image| [image.width, image.height].map(|side| side as u32)),
+        }
+    })
+}
+
+/// From the primaries of the colours that a PNG or JPEG file holds to Rec.709's; `None` where they are the same. What the
+/// file says of its curve is not looked at.
+///
+/// # Errors
+/// When it cannot be read as an image, or its colours have no white.
+pub fn to_rec709(path: &Path, warnings: &mut Vec<Warning>) -> Result<Option<DMat3>, SceneError> {
+    let bytes = read_bytes(path, MOST_BYTES)?;
+    let claims = guarded(path, || raster::claims(Opened { path, bytes: &bytes, size: None }))?;
+    Ok(claims.followed(path, warnings)?.and_then(|space| space.to_rec709()))
 }
 
 /// A tangent-space normal map as stored, turned to +Y up when `flip` says that it is +Y down; and its alpha, where it

@@ -1,9 +1,9 @@
 //! OpenEXR: the first layer that has colours, placed in the display window.
+//!
+//! Colours are R, G and B, or luminance and chroma (Y, RY, BY), or Y alone, which is grey.
 
 use std::io::Cursor;
 
-use exr::block::chunk::CompressedBlock;
-use exr::block::reader::ChunksReader;
 use exr::compression::Compression;
 use exr::image::{FlatSamples, Layer};
 use exr::meta::MetaData;
@@ -11,17 +11,20 @@ use exr::meta::header::Header;
 use exr::prelude::{AnyChannels, ReadChannels, ReadLayers, Vec2};
 use glam::DVec2;
 
-use super::chromaticities::Chromaticities;
+use super::chroma::{self, Chroma};
+use super::chromaticities::{Chromaticities, REC709};
 use super::claims::Claims;
-use super::{Image, Opened};
+use super::{Image, Opened, dwa, sampled};
 use crate::scene::error::SceneError;
 
 const KIND: &str = "an EXR file";
+const FULL: &str =
+    "Save it as RGB with all channels at full resolution, or with chroma (RY, BY) for 2 x 2 pixels each";
 
 /// Decode an EXR file of any compression; tiled files at their full resolution.
 pub(super) fn decode(opened: Opened<'_>) -> Result<Image, SceneError> {
-    let remedy = "Save colours under these names, in any layer; luminance and chroma (Y, RY, BY) as RGB";
-    decode_by(opened, colours, "has no channels R, G and B, nor Y", remedy)
+    let remedy = "Save colours under these names, in any layer";
+    decode_by(opened, colours, "has no channels R, G and B, nor Y, RY and BY, nor Y", remedy)
 }
 
 /// The haze in an EXR file, as a grey image.
@@ -36,56 +39,120 @@ fn xy(given: exr::meta::attribute::Chromaticities) -> Chromaticities {
     Chromaticities { primaries: [given.red, given.green, given.blue].map(point), white: point(given.white) }
 }
 
-/// The indices of a layer's R, G, B and perhaps A.
-type Found = ([usize; 3], Option<usize>);
+type Channels = AnyChannels<FlatSamples>;
+
+/// Which channels of a layer are looked at, by their indices.
+struct Found {
+    /// R, G and B; or RY, Y and BY.
+    colours: [usize; 3],
+    alpha: Option<usize>,
+    /// Whether they are luminance and chroma.
+    chroma: bool,
+}
+
+impl Found {
+    const fn grey(y: usize, alpha: Option<usize>) -> Self {
+        Self { colours: [y; 3], alpha, chroma: false }
+    }
+}
 
 /// Decode the first layer in which `find` finds something.
 fn decode_by(
     opened: Opened<'_>,
-    find: fn(&Layer<AnyChannels<FlatSamples>>) -> Option<Found>,
+    find: fn(&Layer<Channels>) -> Option<Found>,
     missing: &str,
     remedy: &str,
 ) -> Result<Image, SceneError> {
-    let damaged = |e: exr::error::Error| opened.damaged(KIND, e);
-    let meta = MetaData::read_from_buffered(Cursor::new(opened.bytes), false).map_err(damaged)?;
-    check_sampling(opened, &meta.headers)?;
-    let window = meta.headers.first().map(|header| header.shared_attributes.display_window);
-    let Some(window) = window else { return Err(opened.damaged(KIND, "it has no layer")) };
-    check(opened, &meta.headers, window.size)?;
-    if meta.headers.iter().any(|header| is_dwa(header.compression)) {
-        check_dwa(opened)?;
-    }
-    let image = exr::prelude::read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .all_channels()
-        .all_layers()
-        .all_attributes()
-        // The parallel reader aborts the process should a codec panic on damaged bytes.
-        .non_parallel()
-        .from_buffered(Cursor::new(opened.bytes))
-        .map_err(damaged)?;
-    let mut found = Vec::new();
-    for layer in &image.layer_data {
-        if let Some(channels) = find(layer) {
-            let placed = place(layer, &channels, window.position, window.size);
-            return Ok(Image { chromaticities: image.attributes.chromaticities.map(xy), ..placed });
+    let mut reader = Cursor::new(opened.bytes);
+    let meta = MetaData::read_from_buffered(&mut reader, false).map_err(|e| opened.damaged(KIND, e))?;
+    let behind = opened.bytes.get(reader.position() as usize..).unwrap_or_default();
+    let Some(shared) = meta.headers.first().map(|header| &header.shared_attributes) else {
+        return Err(opened.damaged(KIND, "it has no layer"));
+    };
+    let (window, chromaticities) = (shared.display_window, shared.chromaticities.map(xy));
+    let layers = layers(opened, &meta, behind, window.size)?;
+    for layer in &layers {
+        if let Some(found) = find(layer) {
+            check_full(opened, layer, &found)?;
+            let planes = if found.chroma {
+                colours_of_chroma(opened, layer, &found, chromaticities)?
+            } else {
+                found.colours.map(|i| samples(layer, i))
+            };
+            let placed = place(layer, &planes, found.alpha, window.position, window.size);
+            return Ok(Image { chromaticities, ..placed });
         }
-        found.extend(layer.channel_data.list.iter().map(|channel| channel.name.to_string()));
     }
-    Err(opened.error(format!("{missing} (it has {})", found.join(", ")), remedy))
+    let all = layers.iter().flat_map(|layer| &layer.channel_data.list);
+    let names: Vec<_> = all.map(|channel| channel.name.to_string()).collect();
+    Err(opened.error(format!("{missing} (it has {})", names.join(", ")), remedy))
 }
 
-/// Refuse channels of fewer pixels than others, luminance and chroma (Y, RY, BY) above all: the decoder does not read them.
-fn check_sampling(opened: Opened<'_>, headers: &[Header]) -> Result<(), SceneError> {
-    let mut channels = headers.iter().flat_map(|header| &header.channels.list);
-    if channels.all(|channel| channel.sampling == Vec2(1, 1)) {
-        return Ok(());
+/// All layers, checked before anything is allocated.
+fn layers(
+    opened: Opened<'_>,
+    meta: &MetaData,
+    behind: &[u8],
+    window: Vec2<usize>,
+) -> Result<Vec<Layer<Channels>>, SceneError> {
+    let sampled = sampled::any(&meta.headers);
+    if sampled {
+        sampled::check(&meta.headers).map_err(|what| opened.error(what, FULL))?;
     }
-    Err(opened.error(
-        "has channels of fewer pixels than its image, as luminance and chroma (Y, RY, BY) have",
-        "Save it as RGB with all channels at full resolution",
-    ))
+    check(opened, &meta.headers, window)?;
+    if dwa::any(meta) {
+        dwa::check(meta, behind).map_err(|what| opened.damaged(KIND, what))?;
+    }
+    let layers = if sampled {
+        sampled::layers(meta, behind)
+    } else {
+        let image = exr::prelude::read()
+            .no_deep_data()
+            .largest_resolution_level()
+            .all_channels()
+            .all_layers()
+            .all_attributes()
+            // The parallel reader aborts the process should a codec panic on damaged bytes.
+            .non_parallel()
+            .from_buffered(Cursor::new(opened.bytes));
+        image.map(|image| image.layer_data.into_vec())
+    };
+    layers.map_err(|e| opened.damaged(KIND, e))
+}
+
+/// Refuse channels of fewer samples than pixels that are not chroma: nothing says how to fill them up.
+fn check_full(opened: Opened<'_>, layer: &Layer<Channels>, found: &Found) -> Result<(), SceneError> {
+    let [first, y, last] = found.colours;
+    let full = if found.chroma { vec![y] } else { vec![first, y, last] };
+    for i in full.into_iter().chain(found.alpha) {
+        let channel = &layer.channel_data.list[i];
+        if channel.sampling != Vec2(1, 1) {
+            return Err(opened.error(format!("has fewer pixels of {} than of its image", channel.name), FULL));
+        }
+    }
+    Ok(())
+}
+
+/// R, G and B of a layer's Y, RY and BY.
+fn colours_of_chroma(
+    opened: Opened<'_>,
+    layer: &Layer<Channels>,
+    found: &Found,
+    chromaticities: Option<Chromaticities>,
+) -> Result<[Vec<f32>; 3], SceneError> {
+    let shares = chromaticities.unwrap_or(REC709).luminance().map_err(|what| {
+        let what = format!("has luminance and chroma, and {what} in its attribute `chromaticities`");
+        opened.error(what, "Write the file anew with those of its colours, or save it as RGB")
+    })?;
+    let [ry, y, by] = found.colours;
+    let chroma = [ry, by]
+        .map(|i| Chroma { samples: samples(layer, i), sampling: layer.channel_data.list[i].sampling });
+    let rgb = chroma::to_rgb(&samples(layer, y), chroma, layer.size.x(), shares.map(|share| share as f32));
+    Ok([0, 1, 2].map(|c| rgb.iter().map(|rgb| rgb[c]).collect()))
+}
+
+fn samples(layer: &Layer<Channels>, i: usize) -> Vec<f32> {
+    layer.channel_data.list[i].sample_data.values_as_f32().collect()
 }
 
 /// Refuse what cannot be read, before its pixels are allocated.
@@ -98,8 +165,8 @@ fn check(opened: Opened<'_>, headers: &[Header], window: Vec2<usize>) -> Result<
         }
         let texels = (header.layer_size.width() as u64).saturating_mul(header.layer_size.height() as u64);
         data = data.saturating_add(texels);
-        let per_texel = header.channels.bytes_per_pixel as u64;
-        bytes = bytes.saturating_add(texels.saturating_mul(per_texel) / expansion(header.compression));
+        let raw = sampled::bytes_of(&header.channels, header.layer_size, 0);
+        bytes = bytes.saturating_add(raw / expansion(header.compression));
         // Every chunk has 8 bytes in the table and 8 of its own.
         bytes = bytes.saturating_add((header.chunk_count as u64).saturating_mul(16));
     }
@@ -115,63 +182,6 @@ fn check(opened: Opened<'_>, headers: &[Header], window: Vec2<usize>) -> Result<
         return Err(opened.damaged(KIND, format!("its display window is {width} x {height}")));
     }
     opened.check_size(width, height, u64::MAX)
-}
-
-const fn is_dwa(compression: Compression) -> bool {
-    matches!(compression, Compression::DWAA(_) | Compression::DWAB(_))
-}
-
-/// Refuse DWA chunks that promise more than they can hold: the decoder allocates what their headers
-/// say, and memory that cannot be had ends the process.
-fn check_dwa(opened: Opened<'_>) -> Result<(), SceneError> {
-    let damaged = |e: exr::error::Error| opened.damaged(KIND, e);
-    let chunks =
-        exr::block::read(Cursor::new(opened.bytes), false).and_then(|reader| reader.all_chunks(false));
-    let mut chunks = chunks.map_err(damaged)?;
-    let headers = chunks.meta_data().headers.clone();
-    let texels = |size: Vec2<usize>| (size.width() as u64).saturating_mul(size.height() as u64);
-    let bytes_of =
-        |header: &Header, texels: u64| texels.saturating_mul(header.channels.bytes_per_pixel as u64);
-    let dwa = headers.iter().filter(|header| is_dwa(header.compression));
-    let needed: u64 = dwa.map(|header| bytes_of(header, texels(header.layer_size))).sum();
-    let mut held = 0_u64;
-    // An error is left to the decoder, which meets it too.
-    while let Some(Ok(chunk)) = chunks.next() {
-        let bytes = match &chunk.compressed_block {
-            CompressedBlock::ScanLine(block) => &block.compressed_pixels_le,
-            CompressedBlock::Tile(block) => &block.compressed_pixels_le,
-            _ => continue,
-        };
-        let Some(header) = headers.get(chunk.layer_index).filter(|header| is_dwa(header.compression)) else {
-            continue;
-        };
-        let place = header.get_block_data_indices(&chunk.compressed_block);
-        let Ok(place) = place.and_then(|tile| header.get_absolute_block_pixel_coordinates(tile)) else {
-            break;
-        };
-        let raw = bytes_of(header, texels(place.size));
-        let length = bytes.len() as u64;
-        if length == 0 || length == raw {
-            held = held.saturating_add(raw);
-            continue;
-        }
-        // Eleven numbers (ImfDwaCompressor.cpp): 1 bytes of other channels, 6 run-length codes, 7 bytes
-        // behind them, 8 and 9 numbers of AC and DC coefficients.
-        let mut words =
-            bytes.chunks_exact(8).map(|w| w.iter().rev().fold(0_u64, |n, &b| n << 8 | u64::from(b)));
-        let words: [u64; 10] = std::array::from_fn(|_| words.next().unwrap_or(0));
-        // Deflate packs 1032 to 1, the Huffman coder 255 values into 9 bits.
-        let packed = length.saturating_mul(1032);
-        if words[1].max(words[7]) > raw || words[6].max(words[8]).max(words[9]) > packed {
-            return Err(opened.damaged(KIND, "a DWA chunk promises more than it can hold"));
-        }
-        // A DC coefficient stands for 64 samples of at most 4 bytes.
-        held = held.saturating_add(words[1] + words[7] + 256 * words[9]);
-    }
-    if held < needed {
-        return Err(opened.damaged(KIND, "its DWA chunks hold less than the image"));
-    }
-    Ok(())
 }
 
 /// How many bytes of pixels a byte of the file can hold at most.
@@ -192,22 +202,22 @@ fn expansion(compression: Compression) -> u64 {
 }
 
 /// The names of a layer's channels in lower case.
-fn names(layer: &Layer<AnyChannels<FlatSamples>>) -> Vec<String> {
+fn names(layer: &Layer<Channels>) -> Vec<String> {
     layer.channel_data.list.iter().map(|channel| channel.name.to_string().to_lowercase()).collect()
 }
 
 /// The haze of a layer: the channel `haze.Y`, or the Y of an image that has no colours beside it.
-fn haze(layer: &Layer<AnyChannels<FlatSamples>>) -> Option<Found> {
+fn haze(layer: &Layer<Channels>) -> Option<Found> {
     let names = names(layer);
     let find = |name: &str| names.iter().position(|n| n == name);
     let grey = || find("y").filter(|_| ["r", "g", "b", "ry", "by"].iter().all(|other| find(other).is_none()));
     let at = find("haze.y").or_else(grey)?;
-    Some(([at; 3], None))
+    Some(Found::grey(at, None))
 }
 
-/// The indices of R, G, B and perhaps A in a layer: of the unnamed channel group if it has them, else
-/// of the first that has (`beauty.R`, ...). A grey image's Y stands for all three.
-fn colours(layer: &Layer<AnyChannels<FlatSamples>>) -> Option<Found> {
+/// R, G, B and perhaps A of a layer: of the unnamed channel group if it has them, else of the first that has
+/// (`beauty.R`, ...); else luminance and chroma by the same rule. A grey image's Y stands for all three.
+fn colours(layer: &Layer<Channels>) -> Option<Found> {
     let names = names(layer);
     let mut groups: Vec<&str> =
         names.iter().map(|n| n.rsplit_once('.').map_or("", |(group, _)| group)).collect();
@@ -217,27 +227,28 @@ fn colours(layer: &Layer<AnyChannels<FlatSamples>>) -> Option<Found> {
         let full = if group.is_empty() { name.to_owned() } else { format!("{group}.{name}") };
         names.iter().position(|n| *n == full)
     };
-    for group in &groups {
-        if let (Some(r), Some(g), Some(b)) = (find(group, "r"), find(group, "g"), find(group, "b")) {
-            return Some(([r, g, b], find(group, "a")));
+    for (names, chroma) in [(["r", "g", "b"], false), (["ry", "y", "by"], true)] {
+        for group in &groups {
+            if let [Some(first), Some(second), Some(third)] = names.map(|name| find(group, name)) {
+                return Some(Found { colours: [first, second, third], alpha: find(group, "a"), chroma });
+            }
         }
     }
-    // With RY and BY beside it, Y would lose the colour; beside an X it is a coordinate.
+    // With RY or BY beside it, Y would lose the colour; beside an X it is a coordinate.
     groups.iter().find_map(|group| {
-        let grey = find(group, "y").filter(|_| find(group, "ry").is_none() && find(group, "x").is_none())?;
-        Some(([grey; 3], find(group, "a")))
+        let alone = ["ry", "by", "x"].iter().all(|other| find(group, other).is_none());
+        find(group, "y").filter(|_| alone).map(|grey| Found::grey(grey, find(group, "a")))
     })
 }
 
 /// The layer in the display window; outside of the layer everything is 0.
 fn place(
-    layer: &Layer<AnyChannels<FlatSamples>>,
-    (rgb, alpha): &Found,
+    layer: &Layer<Channels>,
+    planes: &[Vec<f32>; 3],
+    alpha: Option<usize>,
     origin: Vec2<i32>,
     size: Vec2<usize>,
 ) -> Image {
-    let channels = &layer.channel_data.list;
-    let samples = |i: usize| -> Vec<f32> { channels[i].sample_data.values_as_f32().collect() };
     let (width, height) = (size.width(), size.height());
     let offset = |layer: i32, window: i32| i64::from(layer) - i64::from(window);
     let position = layer.attributes.layer_position;
@@ -251,12 +262,12 @@ fn place(
         }
     };
     let mut out = vec![[0.0; 3]; width * height];
-    for (c, &i) in rgb.iter().enumerate() {
-        copy(&samples(i), Box::new(|at, value| out[at][c] = value));
+    for (c, plane) in planes.iter().enumerate() {
+        copy(plane, Box::new(|at, value| out[at][c] = value));
     }
     let alpha = alpha.map(|i| {
         let mut plane = vec![0.0; width * height];
-        copy(&samples(i), Box::new(|at, value| plane[at] = value));
+        copy(&samples(layer, i), Box::new(|at, value| plane[at] = value));
         plane
     });
     Image {

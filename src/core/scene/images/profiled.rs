@@ -121,6 +121,19 @@ fn display_p3_is_taken_to_rec709_by_its_profile_and_by_its_code_points() {
 }
 
 #[test]
+fn primaries_are_told_without_their_curve() {
+    let read = |said: &Said| {
+        let (_folder, path) = file("face.png", &png_of(said, png::ColorType::Rgb, false));
+        to_rec709(&path, &mut Vec::new()).unwrap()
+    };
+    assert_eq!(read(&Said::default()), None);
+    assert_eq!(read(&Said::default().words(*b"gAMA", &[100_000])), None);
+    let rows = read(&Said::profile(&ColorProfile::new_display_p3())).unwrap().transpose().to_cols_array_2d();
+    // As the colours are held to.
+    assert!(rows.as_flattened().iter().zip(P3.as_flattened()).all(|(got, want)| (got - want).abs() < 5e-4));
+}
+
+#[test]
 fn adobe_rgb_has_its_own_curve() {
     let (texels, _) = read_png(&Said::profile(&ColorProfile::new_adobe_rgb()), true);
     // Its red alone is 1.3984 of Rec.709's (Lindbloom's matrices, Bradford), and its curve 563/256.

@@ -31,11 +31,7 @@ pub(super) fn decode(opened: Opened<'_>, format: ImageFormat) -> Result<Image, S
     let densest = if format == ImageFormat::Png { PNG_TEXELS } else { JPEG_TEXELS };
     opened.check_size(width.into(), height.into(), densest)?;
     let has_alpha = decoder.color_type().has_alpha();
-    let grey = !decoder.color_type().has_color();
-    let claims = match format {
-        ImageFormat::Png => Claims::of_png(opened.bytes, grey),
-        _ => Claims::of_jpeg(opened.bytes, decoder.icc_profile().ok().flatten(), grey),
-    };
+    let claims = claims_of(opened, format, &mut decoder);
     let deep = decoder.color_type().bytes_per_pixel() / decoder.color_type().channel_count() > 1;
     let decoded = DynamicImage::from_decoder(decoder).map_err(damaged)?;
     let code: u16 = if deep { u16::MAX } else { 255 };
@@ -62,6 +58,40 @@ pub(super) fn decode(opened: Opened<'_>, format: ImageFormat) -> Result<Image, S
         claims,
         space: None,
     })
+}
+
+/// What a PNG or JPEG file says of its colours, which are not decoded; nothing where it is of another kind.
+pub(super) fn claims(opened: Opened<'_>) -> Result<Claims, SceneError> {
+    let Some(format) = format_of(opened) else { return Ok(Claims::default()) };
+    let mut decoder = ImageReader::with_format(Cursor::new(opened.bytes), format)
+        .into_decoder()
+        .map_err(|error| opened.damaged("an image", error))?;
+    Ok(claims_of(opened, format, &mut decoder))
+}
+
+/// The width and height of a PNG or JPEG file, which is not decoded; nothing of another kind.
+pub(super) fn size(opened: Opened<'_>) -> Result<Option<[u32; 2]>, SceneError> {
+    let Some(format) = format_of(opened) else { return Ok(None) };
+    let size = ImageReader::with_format(Cursor::new(opened.bytes), format).into_dimensions();
+    let (width, height) = size.map_err(|error| opened.damaged("an image", error))?;
+    Ok(Some([width, height]))
+}
+
+/// PNG or JPEG, by its first bytes.
+fn format_of(opened: Opened<'_>) -> Option<ImageFormat> {
+    match opened.bytes {
+        [0x89, b'P', b'N', b'G', ..] => Some(ImageFormat::Png),
+        [0xff, 0xd8, 0xff, ..] => Some(ImageFormat::Jpeg),
+        _ => None,
+    }
+}
+
+fn claims_of(opened: Opened<'_>, format: ImageFormat, decoder: &mut impl ImageDecoder) -> Claims {
+    let grey = !decoder.color_type().has_color();
+    match format {
+        ImageFormat::Png => Claims::of_png(opened.bytes, grey),
+        _ => Claims::of_jpeg(opened.bytes, decoder.icc_profile().ok().flatten(), grey),
+    }
 }
 
 /// Whether an end-of-image marker follows the last start of a scan: the decoder would fill what is

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::space::Curve;
+use crate::model::params::LARGEST;
 use crate::scene::error::{SceneError, read_bytes};
 
 /// A table of every code of sixteen bits, written out, is shorter.
@@ -22,7 +23,7 @@ impl Response {
     /// with commas between them.
     ///
     /// # Errors
-    /// When it cannot be read, or is no response: fewer than two rows, other than finite light of at least 0, or less light
+    /// When it cannot be read, or is no response: fewer than two rows, light below 0 or beyond what images hold, or less light
     /// for a higher code.
     pub(in crate::scene) fn read(path: &Path) -> Result<Self, SceneError> {
         let bytes = read_bytes(path, MOST_BYTES)?;
@@ -39,7 +40,7 @@ impl Response {
                 Some(&[r, g, b]) => [r, g, b],
                 _ => return Err(wrong(line, format!("`{}` is no light of a code", row.trim()))),
             };
-            if let Some(number) = light.into_iter().find(|x| !x.is_finite() || *x < 0.0) {
+            if let Some(number) = light.into_iter().find(|x| !(0.0..=LARGEST).contains(x)) {
                 return Err(wrong(line, format!("{number} is no light")));
             }
             if table.last().is_some_and(|before| (0..3).any(|c| light[c] < before[c])) {
@@ -111,6 +112,7 @@ mod tests {
             ("0\n1,2", "line 2: `1,2` is no light of a code"),
             ("0\n-1", "line 2: -1 is no light"),
             ("0\ninf", "line 2: inf is no light"),
+            ("0\n1e10", "line 2: 10000000000 is no light"),
             ("0\n1\n1,0.9,1", "line 3: a higher code stands for less light"),
             ("1\n1", "is the same for all codes"),
         ] {

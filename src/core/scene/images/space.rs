@@ -82,6 +82,11 @@ impl Space {
         Self { curves, to_rec709: known.and_then(|space| space.to_rec709), most: f64::MAX }
     }
 
+    /// How channels are mixed.
+    pub(super) const fn to_rec709(&self) -> Option<DMat3> {
+        self.to_rec709
+    }
+
     /// Whether channels are mixed: of a mixture no channel tells whether its codes were clipped.
     pub(super) const fn mixes(&self) -> bool {
         self.to_rec709.is_some()

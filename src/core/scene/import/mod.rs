@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DMat4};
 
-use super::cameras::{LARGEST_COEFFICIENT, LARGEST_SIDE, MOST_RATIO, NARROWEST_FOV};
+use super::cameras::{LARGEST_COEFFICIENT, LARGEST_SIDE, MOST_RATIO, NARROWEST_FOV, first_unlit};
 use super::error::SceneError;
 use super::lens::{Distortion, Lens};
 use super::numbers::short;
@@ -30,6 +30,26 @@ pub struct ImportedView {
     pub camera: Camera,
     /// The picture, as its source names it.
     pub picture: PathBuf,
+}
+
+/// Endings of pictures' files, which some programs leave out.
+const ENDINGS: [&str; 8] = ["png", "exr", "jpg", "jpeg", "hdr", "PNG", "JPG", "JPEG"];
+
+/// The file of a picture in `folder`. transforms.json of Blender's own exporter leaves the ending out, and so do Metashape's
+/// labels, of files as cameras name them.
+#[must_use]
+pub fn picture_file(folder: &Path, picture: &Path) -> Option<PathBuf> {
+    let file = folder.join(picture);
+    // A label may have a full stop, and no ending behind it.
+    let ended = |ending: &str| {
+        let mut name = file.clone().into_os_string();
+        name.push(".");
+        name.push(ending);
+        PathBuf::from(name)
+    };
+    let named = !picture.as_os_str().is_empty();
+    let with_ending = ENDINGS.into_iter().filter(|_| named).map(ended);
+    std::iter::once(file.clone()).chain(with_ending).find(|file| file.is_file())
 }
 
 /// A camera's numbers as programs of this kind have them: pixels, from the image's upper left corner.
@@ -60,10 +80,19 @@ impl Intrinsics {
             );
             return Err(SceneError::new(path, what, remedy).at(place));
         }
-        match self.problem() {
-            Some(problem) => Err(damaged(path, place, format!("has {problem}"))),
-            None => Ok(self),
+        if let Some(problem) = self.problem() {
+            return Err(damaged(path, place, format!("has {problem}")));
         }
+        // No scene with it could be read.
+        if let Some((x, y)) = first_unlit(&self.placed(DMat4::IDENTITY)) {
+            let what = format!(
+                "has a lens that folds its image over, or sees 89 degrees from its axis, at pixel ({x}, {y})"
+            );
+            let remedy =
+                "Check its coefficients and the image's size, or undistort the pictures and solve anew";
+            return Err(SceneError::new(path, what, remedy).at(place));
+        }
+        Ok(self)
     }
 
     /// What no camera has.

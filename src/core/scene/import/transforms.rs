@@ -4,9 +4,10 @@ use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DMat4, DVec4};
 
-use super::{ImportedView, Intrinsics, Names, brown, damaged, side};
+use super::{ImportedView, Intrinsics, Names, brown, damaged, picture_file, side};
 use crate::scene::cameras::turns_alone;
 use crate::scene::error::{SceneError, read_bytes};
+use crate::scene::images::size_of;
 use crate::scene::lens::Distortion;
 
 /// No such file above this many bytes is read.
@@ -49,11 +50,12 @@ struct Frame {
     own: Numbers,
 }
 
-/// The views of the file, in its order.
+/// The views of the file, in its order. Pictures whose size the file does not tell, as Blender's does not, are looked for in
+/// the folder `images` and beside the file.
 ///
 /// # Errors
-/// When it is damaged, or a camera has distortion of a kind that scenes do not know.
-pub fn read(path: &Path) -> Result<Vec<ImportedView>, SceneError> {
+/// When it is damaged, a camera has distortion of a kind that scenes do not know, or a size is not known.
+pub fn read(path: &Path, images: Option<&Path>) -> Result<Vec<ImportedView>, SceneError> {
     let bytes = read_bytes(path, MOST_BYTES)?;
     let file: File = serde_json::from_slice(&bytes).map_err(|error| {
         damaged(path, format!("line {}", error.line()), format!("is no transforms.json: {error}"))
@@ -72,20 +74,49 @@ pub fn read(path: &Path) -> Result<Vec<ImportedView>, SceneError> {
         {
             return Err(damaged(path, place, format!("has a transform_matrix that {what}")));
         }
-        let intrinsics = intrinsics(path, &place, &frame.own, &file.all)?;
+        let known = given(&frame.own, &file.all, |n| n.w).zip(given(&frame.own, &file.all, |n| n.h));
+        let size = match known {
+            Some((width, height)) => [width, height],
+            None => picture_size(path, &place, images, &frame.file_path)?,
+        };
+        let intrinsics = intrinsics(path, &place, &frame.own, &file.all, size)?;
         let camera = intrinsics.placed(matrix.inverse());
         Ok(ImportedView { name: names.of(&frame.file_path), camera, picture: frame.file_path })
     };
     file.frames.into_iter().enumerate().map(view).collect()
 }
 
+/// A frame's number, where it has one, over that of all.
+fn given(own: &Numbers, all: &Numbers, number: fn(&Numbers) -> Option<f64>) -> Option<f64> {
+    number(own).or_else(|| number(all))
+}
+
+/// The size of a frame's picture, by the picture itself.
+fn picture_size(
+    path: &Path,
+    place: &str,
+    images: Option<&Path>,
+    picture: &Path,
+) -> Result<[f64; 2], SceneError> {
+    let beside = path.parent().unwrap_or(Path::new(""));
+    let file = images.into_iter().chain([beside]).find_map(|folder| picture_file(folder, picture));
+    let file = file.ok_or_else(|| {
+        let what = format!("has no w and h, and its picture {} is not there either", picture.display());
+        let remedy = "Add the width and height of the pictures to the file, as w and h, or name their folder";
+        SceneError::new(path, what, remedy).at(place)
+    })?;
+    Ok(size_of(&file)?.map(f64::from))
+}
+
 /// A frame's numbers, where it has some, over those of all.
-fn intrinsics(path: &Path, place: &str, own: &Numbers, all: &Numbers) -> Result<Intrinsics, SceneError> {
-    let given = |number: fn(&Numbers) -> Option<f64>| number(own).or_else(|| number(all));
-    let asked = |number: fn(&Numbers) -> Option<f64>, name: &str| {
-        given(number).ok_or_else(|| damaged(path, place, format!("has no {name}, and neither has the file")))
-    };
-    let (width, height) = (asked(|n| n.w, "w")?, asked(|n| n.h, "h")?);
+fn intrinsics(
+    path: &Path,
+    place: &str,
+    own: &Numbers,
+    all: &Numbers,
+    [width, height]: [f64; 2],
+) -> Result<Intrinsics, SceneError> {
+    let given = |number: fn(&Numbers) -> Option<f64>| given(own, all, number);
     let of_angle = |angle: Option<f64>, pixels: f64| angle.map(|angle| 0.5 * pixels / (0.5 * angle).tan());
     let across = given(|n| n.fl_x).or_else(|| of_angle(given(|n| n.camera_angle_x), width));
     let down = given(|n| n.fl_y).or_else(|| of_angle(given(|n| n.camera_angle_y), height));

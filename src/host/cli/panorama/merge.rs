@@ -103,7 +103,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
                 "--write-response: the response is given. Find it with --response recover, or leave the option out.",
             ));
         }
-        if *path == arguments.output {
+        if pictures::place(path) == pictures::place(&arguments.output) {
             let path = path.display();
             return Err(Refusal::new(format!(
                 "--write-response: {path} is where the radiance goes. Name another file."
@@ -114,22 +114,21 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     let each = arguments.photographs.iter().zip(&arguments.seconds);
     let exposures: Vec<Exposure> =
         each.map(|(path, &seconds)| pictures::exposure(path, seconds)).collect::<Result<_, _>>()?;
+    let primaries = pictures::primaries(&arguments.photographs)?;
     let response = match &arguments.response {
         Asked::Given(response) => response.clone(),
         Asked::Recovered => {
             let found = recover(&exposures, SMOOTHNESS)?;
             let off = found.residual.map(|share| format!("{}%", digits(100.0 * share, 2))).join(", ");
             say(&format!("response recovered; photographs lie off it by {off} (red, green, blue)"))?;
-            if let (Some(path), Response::Table(table)) = (&arguments.write_response, &found.response) {
-                let rows: String = table.iter().map(|[r, g, b]| format!("{r:?},{g:?},{b:?}\n")).collect();
-                output::write(path, rows.as_bytes())?;
-                say(&format!("wrote {}", path.display()))?;
-            }
             found.response
         }
     };
     let weighting = if arguments.weighting == "hat" { Weighting::Hat } else { Weighting::default() };
     let mut merged = merge(&exposures, &response, MergeOptions { weighting, align: arguments.align })?;
+    if let Some(to_rec709) = primaries {
+        pictures::mix(&mut merged.picture, to_rec709);
+    }
     let balanced = match arguments.grey_card {
         Some(rectangle) => Some(balance(&mut merged, rectangle, arguments.reflectance)?),
         None => None,
@@ -139,6 +138,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     tell_counts(&merged);
     if let Some(told) = balanced {
         say(&told)?;
+    }
+    // Nothing is written before all that may be refused is behind.
+    if let (Some(path), Response::Table(table)) = (&arguments.write_response, &response) {
+        let rows: String = table.iter().map(|[r, g, b]| format!("{r:?},{g:?},{b:?}\n")).collect();
+        output::write(path, rows.as_bytes())?;
+        say(&format!("wrote {}", path.display()))?;
     }
     pictures::write(&arguments.output, &merged.picture)?;
     say(&format!("wrote {}", arguments.output.display()))?;
@@ -182,7 +187,8 @@ fn tell_counts(merged: &Merged) {
 
 /// Make a card grey, and where a reflectance is given as bright as it says; returns what that was.
 fn balance(merged: &mut Merged, rectangle: Rectangle, reflectance: Option<f64>) -> Result<String, Refusal> {
-    let card = grey_card::measure(&merged.picture, rectangle, reflectance.unwrap_or(REFLECTANCE))?;
+    let assumed = reflectance.unwrap_or(REFLECTANCE);
+    let card = grey_card::measure(&merged.picture, Some(&merged.seen), rectangle, assumed)?;
     if card.unevenness > UNEVEN {
         let percent = digits(100.0 * card.unevenness, 2);
         tell(&format!(

@@ -133,7 +133,25 @@ fn read(path: &Path) -> Result<(Vec<String>, Vec<Shot>), Refusal> {
     Ok((names, shots))
 }
 
+/// Refuse what another lens has, as its number would say nothing here.
+fn check_foreign(table: &ShotTable) -> Result<(), String> {
+    let ball = table.lens == LensName::MirrorBall;
+    let (kind, other) = if ball { ("a mirror ball", "a fisheye") } else { ("a fisheye", "a mirror ball") };
+    let foreign: &[(&str, bool)] = if ball {
+        &[("field_of_view_degrees", table.field_of_view_degrees.is_some())]
+    } else {
+        &[("camera_degrees", table.camera_degrees.is_some()), ("trusted", table.trusted.is_some())]
+    };
+    match foreign.iter().find(|(_, given)| *given) {
+        Some((key, _)) => {
+            Err(format!("{key} is {other}'s, and its lens is {kind}. Leave it out, or correct lens."))
+        }
+        None => Ok(()),
+    }
+}
+
 fn lens(table: &ShotTable) -> Result<Lens, String> {
+    check_foreign(table)?;
     let (centre, radius) = (DVec2::from(table.centre), table.radius);
     let projection = match table.lens {
         LensName::Equidistant => Projection::Equidistant,
@@ -156,4 +174,60 @@ fn looking(towards: [f64; 3], up: [f64; 3]) -> Option<DQuat> {
     // Nearer to the axis what is upright is what roundings make of it.
     let right = (right.length() > 1e-6).then(|| right.normalize())?;
     Some(DQuat::from_mat3(&DMat3::from_cols(right, back.cross(right), back)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SHOTS: &str = "[[shot]]
+file = \"shot.png\"
+lens = \"equidistant\"
+centre = [2.0, 2.0]
+radius = 1.5
+field_of_view_degrees = 180.0
+towards = [0, 0, -1]
+up = [0, 1, 0]
+gain = 1.0
+
+[[shot]]
+file = \"shot.png\"
+lens = \"mirror_ball\"
+centre = [2.0, 2.0]
+radius = 1.5
+towards = [0, 0, 1]
+camera_degrees = 10.0
+trusted = 0.97
+";
+
+    /// Whatever stands in the file: shots, or one paragraph that names it.
+    #[test]
+    fn no_file_of_shots_makes_its_reader_panic() {
+        let folder = tempfile::tempdir().unwrap();
+        image::RgbImage::new(4, 4).save(folder.path().join("shot.png")).unwrap();
+        let path = folder.path().join("shots.toml");
+        let read_bytes = |bytes: &[u8]| {
+            std::fs::write(&path, bytes).unwrap();
+            let read = read(&path);
+            if let Err(refusal) = &read {
+                assert!(refusal.words.starts_with(&folder.path().display().to_string()));
+                assert!(!refusal.words.contains('\n'), "{}", refusal.words);
+            }
+            read.is_ok()
+        };
+        assert!(read_bytes(SHOTS.as_bytes()));
+        for at in 0..SHOTS.len() {
+            read_bytes(&SHOTS.as_bytes()[..at]);
+            for odd in *b"\0-9\"[\xff" {
+                let mut bytes = SHOTS.as_bytes().to_vec();
+                bytes[at] = odd;
+                read_bytes(&bytes);
+            }
+        }
+        for (from, to) in
+            [("1.5", "nan"), ("2.0", "inf"), ("-1", "-1e308"), ("1.0", "\"x\""), ("[0, 1, 0]", "[]")]
+        {
+            read_bytes(SHOTS.replace(from, to).as_bytes());
+        }
+    }
 }
