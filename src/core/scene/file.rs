@@ -108,6 +108,7 @@ pub(super) struct ModelTable {
     pub specular_visibility: Option<Spanned<String>>,
     pub lobe_lookup: Option<Spanned<String>>,
     pub specular_map: Option<Spanned<String>>,
+    pub normal_filter: Option<Spanned<String>>,
     pub visibility: Option<Spanned<String>>,
     pub bounces: Option<Spanned<String>>,
     pub skin_reflection: Option<Spanned<String>>,

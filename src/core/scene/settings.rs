@@ -8,8 +8,8 @@ use super::maps::Spots;
 use super::numbers::{interval, number, short, whole};
 use super::{Bloom, FitSettings, Loss, Quality, map_fit};
 use crate::model::choices::{
-    Bounces, Choices, LobeLookup, SkinReflection, SpecularMap, SpecularModel, SpecularVisibility, SplitSum,
-    Visibility,
+    Bounces, Choices, LobeLookup, NormalFilter, SkinReflection, SpecularMap, SpecularModel,
+    SpecularVisibility, SplitSum, Visibility,
 };
 use crate::model::diffusion::DiffusionChoices;
 use crate::model::effects::{Effect, Effects, Form, Lookups, Silhouette};
@@ -67,6 +67,12 @@ pub(super) fn choices(source: &Source, model: &ModelTable) -> Result<Choices, Sc
             "specular_map",
             model.specular_map.as_ref(),
             SpecularMap::ALL.map(|c| (c.name(), c)),
+        )?,
+        normal_filter: choice(
+            source,
+            "normal_filter",
+            model.normal_filter.as_ref(),
+            NormalFilter::ALL.map(|c| (c.name(), c)),
         )?,
         visibility: choice(
             source,
