@@ -268,10 +268,14 @@ impl Ranges {
     pub fn of(scene: &Scene, fit: bool) -> Self {
         let free = |name: &str| fit && scene.fit.free.iter().any(|column| column.param.name() == name);
         let [exponent, rough, glossy] = Stack::ALL.map(|stack| stack.place(&scene.params));
-        let lobe = Param::SpecularLobe.info();
-        let exponents = if free(lobe.name) { lobe.lower..=lobe.upper } else { exponent..=exponent };
+        let (lower, upper) = scene.fit.bounds.of(Param::SpecularLobe);
+        let exponents = if free(Param::SpecularLobe.name()) {
+            lower.min(exponent)..=upper.max(exponent)
+        } else {
+            exponent..=exponent
+        };
         let widest = match Param::from_identifier("roughness") {
-            Some(roughness) if free("roughness") => roughness.info().upper,
+            Some(roughness) if free("roughness") => scene.fit.bounds.of(roughness).1.max(rough),
             _ => rough,
         };
         let sharpest = match scene.setup().choices.glossy {

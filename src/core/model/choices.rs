@@ -301,7 +301,7 @@ impl SkinReflection {
 impl Choices {
     /// Those that a scene file names, each by its key.
     #[must_use]
-    pub const fn named(&self) -> [(&'static str, &'static str); 17] {
+    pub const fn named(&self) -> [(&'static str, &'static str); 18] {
         let [method, taps, ambient_normal, stretch, seams, lookup, unblurred, combined] =
             self.diffusion.named();
         let [through] = self.transmission.named();
@@ -311,6 +311,7 @@ impl Choices {
             ("specular_visibility", self.specular_visibility.name()),
             ("lobe_lookup", self.lobe_lookup.name()),
             ("specular_map", self.specular_map.name()),
+            ("normal_filter", self.normal_filter.name()),
             ("visibility", self.visibility.name()),
             ("bounces", self.bounces.name()),
             ("skin_reflection", self.skin_reflection.name()),

@@ -138,6 +138,9 @@ pub(super) struct FamilyTable {
 /// `[model.params]`
 pub(super) type ParamsTable = BTreeMap<Spanned<String>, Spanned<ParamValue>>;
 
+/// `[fit.bounds]`
+pub(super) type BoundsTable = BTreeMap<Spanned<String>, Spanned<[f64; 2]>>;
+
 /// `[[view]]`
 #[derive(Clone, Debug, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -239,6 +242,8 @@ pub(super) struct FitTable {
     pub free: Option<Vec<Spanned<String>>>,
     #[serde(default)]
     pub per_channel: Vec<Spanned<String>>,
+    #[serde(default)]
+    pub bounds: BoundsTable,
     pub loss: Option<Spanned<String>>,
     #[serde(default)]
     pub gains: bool,

@@ -159,6 +159,7 @@ fn changes<'a>(values: &'a Values, effects: &'a [&'static str]) -> Changes<'a> {
     Changes {
         effects: Some(effects),
         free: Some(&values.free),
+        bounds: Some(&values.bounds),
         start: Some(Start { form: values.form, params: &values.params, free: &values.free }),
         free_gains: Some(values.free_gains),
         white_balance: Some(values.white_balance),

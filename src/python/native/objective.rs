@@ -10,6 +10,7 @@ use skinfit_core::engine::cpu::CpuEngine;
 use skinfit_core::engine::joint::label;
 use skinfit_core::engine::reference::{PixelColumns, Reference};
 use skinfit_core::engine::{NormalEquations, Objective as _, Point, Unknown};
+use skinfit_core::model::bounds::Bounds;
 use skinfit_core::prepare::{NamedScene, Observed, untied};
 use skinfit_core::scene::{short, suggestion};
 
@@ -37,6 +38,7 @@ impl Objective {
         let values = read.values();
         let mut loaded = read.loaded.clone();
         loaded.scene.params.clone_from(&values.params);
+        loaded.scene.fit.bounds.clone_from(&values.bounds);
         loaded.scene.fit.free = untied(&values.free, &values.params, &[]);
         let scene = NamedScene { name: String::new(), loaded };
         let marked = NamedScene::marked(std::slice::from_ref(&scene), hold_out);
@@ -64,7 +66,7 @@ impl Observing {
         }
         let mut point = self.observed.start();
         for ((unknown, &value), name) in unknowns.iter().zip(x).zip(&self.names) {
-            let (lower, upper) = unknown.bounds();
+            let (lower, upper) = unknown.bounds_within(self.bounds());
             if !value.is_finite() || !(lower..=upper).contains(&value) {
                 let [lower, upper] = [lower, upper].map(short);
                 return Err(Refused::Param(format!(
@@ -74,6 +76,11 @@ impl Observing {
             unknown.set(&mut point, value);
         }
         Ok(point)
+    }
+
+    /// What the scene bounds its parameters by.
+    fn bounds(&self) -> &[Bounds] {
+        std::slice::from_ref(&self.observed.scene.fit.bounds)
     }
 
     /// The number of a view.
@@ -199,7 +206,8 @@ impl Objective {
     /// Least and greatest value of each.
     #[getter]
     fn bounds(&self) -> Vec<(f64, f64)> {
-        self.0.engine.unknowns().iter().map(Unknown::bounds).collect()
+        let within = self.0.bounds();
+        self.0.engine.unknowns().iter().map(|unknown| unknown.bounds_within(within)).collect()
     }
 
     /// The loss.

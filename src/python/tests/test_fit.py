@@ -36,6 +36,27 @@ def test_changed_values_are_those_of_the_command_lines_words(
     assert list(found.std_errors) == ["base_weight", "rim_exponent", "hilite.r", "hilite.g", "hilite.b"]
 
 
+def test_a_fit_stays_within_the_bounds_that_are_set(
+    scene: skinfit.Scene, cache: Path, program: Program, tmp_path: Path
+) -> None:
+    scene.params.free_only("base_weight", "rim_exponent")
+    scene.params.bound("base_weight", 0.5, 0.8)
+    assert scene.params.info("base_weight").bounds == (0.5, 0.8)
+    scene.params["base_weight"] = 0.6
+    found = scene.fit(engine="cpu", run=tmp_path / "run")
+    # The truth is 0.85.
+    assert found.params["base_weight"] == 0.8 and found.std_errors["base_weight"] is None
+    assert scene.objective().bounds[0] == (0.5, 0.8)
+    # The folder's scene file holds them for the command line.
+    program("fit", tmp_path / "run" / "scene.toml", "-o", tmp_path / "again", "--cache", cache, "--engine", "cpu")
+    assert numbers(report_of(tmp_path / "again"))["unknowns"] == numbers(found.report)["unknowns"]
+    with pytest.raises(skinfit.ParamError, match="no such interval"):
+        scene.params.bound("base_weight", 0.8, 0.5)
+    scene.params.bound("base_weight")
+    info = scene.params.info("base_weight")
+    assert info.bounds == info.limits
+
+
 def test_what_is_found_stands_in_the_fit(fitted: skinfit.Fit, tmp_path: Path) -> None:
     assert fitted.params["base_weight"] == pytest.approx(0.85, abs=1e-5)
     names, matrix = fitted.correlations
