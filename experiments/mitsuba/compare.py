@@ -96,7 +96,9 @@ def make(folder: Path) -> Any:
     arrays.update()
     plain.write_ply(str(folder / "sphere.ply"))
     scene = fit_mitsuba.scene_of(folder, JOB, JOB["truth"])
-    target = np.mean([np.array(mi.render(scene, spp=SAMPLES, seed=seed)) for seed in range(PARTS)], axis=0)
+    integrator = mi.load_dict({"type": "direct", "hide_emitters": True})
+    parts = [np.array(mi.render(scene, integrator=integrator, spp=SAMPLES, seed=seed)) for seed in range(PARTS)]
+    target = np.mean(parts, axis=0)
     mi.Bitmap(target.astype(np.float32)).write(str(folder / "target.exr"))
     return target
 

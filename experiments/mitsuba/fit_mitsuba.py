@@ -46,6 +46,7 @@ def scene_of(folder: Path, job: dict[str, Any], reflectance: list[float]) -> Any
             "fov": camera["fov_y_degrees"],
             "fov_axis": "y",
             "to_world": mi.ScalarTransform4f().look_at(camera["eye"], camera["look_at"], camera["up"]),
+            "sampler": {"type": "multijitter"},
             "film": film,
         },
     }
