@@ -14,6 +14,7 @@ import skinfit
 from numpy.typing import NDArray
 
 Program = Callable[..., "subprocess.CompletedProcess[str]"]
+NotChecked = Callable[[str], None]
 
 
 @pytest.fixture(scope="session")
@@ -106,6 +107,17 @@ def numbers(report: dict[str, Any]) -> dict[str, Any]:
 def report_of(run: Path) -> dict[str, Any]:
     report: dict[str, Any] = json.loads((run / "report.json").read_bytes())
     return report
+
+
+@pytest.fixture
+def not_checked(capfd: pytest.CaptureFixture[str]) -> NotChecked:
+    """Say on standard error what is left out, past what keeps a passing test quiet."""
+
+    def say(words: str) -> None:
+        with capfd.disabled():
+            print(f"\nNOT CHECKED: {words}", file=sys.stderr, flush=True)
+
+    return say
 
 
 @pytest.fixture
