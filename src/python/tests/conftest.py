@@ -1,6 +1,7 @@
 """What the tests share: the built-in scene, and the command line in a process of its own."""
 
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -22,6 +23,13 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def demo_file(cache: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The built-in scene's file, which no test changes."""
     return skinfit.demo(tmp_path_factory.mktemp("demo"), cache=cache).path
+
+
+@pytest.fixture(scope="session")
+def adapter() -> None:
+    """What asks for it needs a graphics adapter."""
+    if os.environ.get("SKINFIT_NO_GPU_TESTS"):
+        pytest.skip("NOT CHECKED: SKINFIT_NO_GPU_TESTS is set")
 
 
 @pytest.fixture
