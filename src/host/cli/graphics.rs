@@ -112,7 +112,8 @@ impl Task {
 
 /// What a fit of maps says of its adapter, and what to do about it.
 #[cfg(feature = "burn")]
-pub(super) fn tensor_words(error: &crate::tensor::TensorError) -> String {
+#[must_use]
+pub fn tensor_words(error: &crate::tensor::TensorError) -> String {
     match error {
         crate::tensor::TensorError::Gpu(error) => Task::Maps.words(error),
         error => error.to_string(),

@@ -54,6 +54,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+#[cfg(feature = "burn")]
+pub use self::graphics::tensor_words;
 pub use self::requested::{CommandLine, save as save_scene};
 pub use self::scene::parse_effects;
 use crate::contained::{hear, is_contained};

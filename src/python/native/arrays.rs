@@ -4,7 +4,8 @@ use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 use exr::prelude::{Image as Exr, SpecificChannels, Vec2, WritableImage as _};
-use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray3};
+use numpy::ndarray::Dimension;
+use numpy::{Element, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray, PyReadonlyArray3};
 use pyo3::{Bound, PyResult, Python, pyfunction};
 use skinfit_core::output::{self, OutputError};
 use skinfit_core::render::image::Image;
@@ -31,13 +32,19 @@ pub(crate) fn plane(
     PyArray1::from_vec(py, numbers).reshape(size)
 }
 
+/// The numbers of an array, row by row.
+pub(crate) fn numbers<T: Element + Copy, D: Dimension>(array: &PyReadonlyArray<'_, T, D>) -> Vec<T> {
+    let array = array.as_array();
+    // At once where they lie so already.
+    array.as_slice().map_or_else(|| array.iter().copied().collect(), <[T]>::to_vec)
+}
+
 /// Write an array of (height, width, 3), or of (height, width, 4) with coverage, as an OpenEXR file of 32-bit floats,
 /// whole or not at all.
 #[pyfunction]
 pub(crate) fn write_exr(py: Python<'_>, file: PathBuf, numbers: PyReadonlyArray3<'_, f32>) -> PyResult<()> {
-    let numbers = numbers.as_array();
-    let (height, width, channels) = numbers.dim();
-    let numbers: Vec<f32> = numbers.iter().copied().collect();
+    let (height, width, channels) = numbers.as_array().dim();
+    let numbers = self::numbers(&numbers);
     wait(py, move || {
         if !(3..=4).contains(&channels) || height == 0 || width == 0 {
             return Err(Refused::Array(format!(

@@ -10,6 +10,7 @@ use skinfit_gpu::painter::PaintError;
 
 import_exception!(skinfit.errors, ArrayError);
 import_exception!(skinfit.errors, BakeError);
+import_exception!(skinfit.errors, DeviceError);
 import_exception!(skinfit.errors, Fault);
 import_exception!(skinfit.errors, FileError);
 import_exception!(skinfit.errors, FitError);
@@ -48,6 +49,9 @@ pub(crate) enum Refused {
     /// A view that there is not.
     #[error("{0}")]
     View(String),
+    /// An adapter that cannot, or a library without what runs on one.
+    #[error("{0}")]
+    Device(String),
     /// What an array has to be.
     #[error("{0}")]
     Array(String),
@@ -68,6 +72,7 @@ impl From<Refused> for PyErr {
             Refused::Fit(_) => FitError::new_err(words),
             Refused::Param(_) => ParamError::new_err(words),
             Refused::View(_) => ViewError::new_err(words),
+            Refused::Device(_) => DeviceError::new_err(words),
             Refused::Array(_) => ArrayError::new_err(words),
             Refused::Fault(_) => Fault::new_err(words),
         }

@@ -3,17 +3,23 @@
 //!
 //! - `scene`: a scene with the values that one edits; `params`: these
 //! - `paint`: a view as an image; `objective`: loss, gradient and Jacobian products; `fitting`: a fit, step by step
+//! - `maps`: the same with respect to whole maps, on the adapter's tensors (`tensors`; `absent` where the library is built
+//!   without); `free`: what is free in either
 //! - `waiting`: long work beside Python, which goes on meanwhile and hears Ctrl-C
 //! - `arrays`: images as arrays and as files; `errors`: what is raised; `program`: the command line
 
 mod arrays;
 mod errors;
 mod fitting;
+mod free;
+mod maps;
 mod objective;
 mod paint;
 mod params;
 mod program;
 mod scene;
+#[cfg_attr(not(feature = "burn"), path = "absent.rs")]
+mod tensors;
 mod waiting;
 
 use pyo3::pymodule;
@@ -27,6 +33,8 @@ mod _native {
     use crate::arrays::write_exr;
     #[pymodule_export]
     use crate::fitting::Fitting;
+    #[pymodule_export]
+    use crate::maps::MapObjective;
     #[pymodule_export]
     use crate::objective::Objective;
     #[pymodule_export]

@@ -3,18 +3,27 @@
 
 use std::sync::Arc;
 
-use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray3};
+use numpy::{
+    PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray3, PyUntypedArrayMethods,
+};
 use pyo3::types::{PyDict, PyDictMethods};
 use pyo3::{Bound, PyResult, Python, pyclass, pymethods};
 use skinfit_core::engine::cpu::CpuEngine;
-use skinfit_core::engine::joint::label;
 use skinfit_core::engine::reference::{PixelColumns, Reference};
+<<<<<<< HEAD
 use skinfit_core::engine::{NormalEquations, Objective as _, Point, Unknown};
 use skinfit_core::model::bounds::Bounds;
 use skinfit_core::prepare::{NamedScene, Observed, untied};
 use skinfit_core::scene::{short, suggestion};
+=======
+use skinfit_core::engine::view::ObservedView;
+use skinfit_core::engine::{NormalEquations, Objective as _};
+use skinfit_core::prepare::Observed;
+>>>>>>> python-maps
 
+use crate::arrays::numbers;
 use crate::errors::Refused;
+use crate::free::{Free, observe};
 use crate::scene::Read;
 use crate::waiting::wait;
 
@@ -23,9 +32,9 @@ use crate::waiting::wait;
 pub(crate) struct Objective(Arc<Observing>);
 
 struct Observing {
-    observed: Observed,
+    free: Free,
+    views: Arc<[ObservedView]>,
     engine: CpuEngine,
-    names: Vec<String>,
 }
 
 /// Products of a view's Jacobian take the numbers of each pixel and channel: its place in the image, its value, and a row
@@ -35,6 +44,7 @@ type Take<'a> = &'a mut dyn FnMut(usize, f64, &[f64]);
 impl Objective {
     /// Of a scene as it stands, over the views that have a target and are not held out.
     pub(crate) fn of(read: &Read, hold_out: &[String]) -> Result<Self, Refused> {
+<<<<<<< HEAD
         let values = read.values();
         let mut loaded = read.loaded.clone();
         loaded.scene.params.clone_from(&values.params);
@@ -45,15 +55,17 @@ impl Objective {
         let marks = marked.map_err(skinfit_core::prepare::PrepareError::from)?.concat();
         let (baked, _) = scene.loaded.bake()?.hold_out(&marks)?;
         let observed = baked.sample()?.observe()?;
+=======
+        let observed = observe(read, hold_out, |_| Ok(()))?;
+>>>>>>> python-maps
         let engine = observed.engine()?;
-        let view = |number: usize| observed.scene.views.get(number).map(|view| view.name.clone());
-        let name = |unknown: &Unknown| label(&unknown.name(), |_| None, view);
-        let names = engine.unknowns().iter().map(name).collect();
-        Ok(Self(Arc::new(Observing { observed, engine, names })))
+        let Observed { baked, views } = observed;
+        Ok(Self(Arc::new(Observing { free: Free::new(baked), views, engine })))
     }
 }
 
 impl Observing {
+<<<<<<< HEAD
     /// The point of these values, each of which its unknown may have.
     fn at(&self, x: &[f64]) -> Result<Point, Refused> {
         let unknowns = self.engine.unknowns();
@@ -104,14 +116,15 @@ impl Observing {
         [camera.height as usize, camera.width as usize]
     }
 
+=======
+>>>>>>> python-maps
     /// Have `take` see each pixel and channel of a view: radiance premultiplied by the coverage, times the gain.
     fn rows(&self, x: &[f64], view: usize, take: Take<'_>) -> Result<(), Refused> {
-        let (point, unknowns) = (self.at(x)?, self.engine.unknowns());
-        let scene = &self.observed.scene;
-        let light = &self.observed.illumination;
-        let reference =
-            Reference::new(self.observed.setup(), light, &self.observed.views, scene.fit.loss, unknowns)?;
-        let samples = &self.observed.views[view].samples;
+        let Free { baked, unknowns, .. } = &self.free;
+        let point = self.free.at(x)?;
+        let (light, loss) = (&baked.illumination, baked.scene.fit.loss);
+        let reference = Reference::new(baked.setup(), light, &self.views, loss, unknowns)?;
+        let samples = &self.views[view].samples;
         let pixels: Vec<PixelColumns> = reference.pixels(view, &point.params);
         for ((slot, pixel), &place) in pixels.into_iter().enumerate().zip(&samples.pixel) {
             if place == u32::MAX {
@@ -139,15 +152,15 @@ impl Observing {
         view: Option<&str>,
         of: impl Fn(f64, &[f64]) -> f64,
     ) -> Result<Plane, Refused> {
-        let view = self.view(view)?;
-        let size = self.size(view);
+        let view = self.free.view(view)?;
+        let size = self.free.size(view);
         let mut numbers = vec![0.0; 3 * size[0] * size[1]];
         self.rows(x, view, &mut |place, value, row| numbers[place] = of(value, row))?;
         Ok(Plane { numbers, size })
     }
 
     fn length(&self, v: &[f64]) -> Result<(), Refused> {
-        let (given, wanted) = (v.len(), self.names.len());
+        let (given, wanted) = (v.len(), self.free.names.len());
         match given == wanted {
             true => Ok(()),
             false => Err(Refused::Array(format!("a vector of {given}, where {wanted} constants are free."))),
@@ -172,48 +185,47 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-fn numbers(of: &PyReadonlyArray1<'_, f64>) -> Vec<f64> {
-    of.as_array().iter().copied().collect()
-}
-
 #[pymethods]
 impl Objective {
     /// The names of what is free, in the order of every vector.
     #[getter]
     fn names(&self) -> Vec<String> {
-        self.0.names.clone()
+        self.0.free.names.clone()
     }
 
     /// The views over which it is.
     #[getter]
     fn views(&self) -> Vec<String> {
-        self.0.observed.scene.views.iter().map(|view| view.name.clone()).collect()
+        self.0.free.views()
     }
 
     /// What the user should know.
     #[getter]
     fn warnings(&self) -> Vec<String> {
-        self.0.observed.warnings.clone()
+        self.0.free.baked.warnings.clone()
     }
 
     /// The values that the scene had.
     #[getter]
     fn start<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        let start = self.0.observed.start();
-        PyArray1::from_vec(py, self.0.engine.unknowns().iter().map(|unknown| unknown.get(&start)).collect())
+        self.0.free.start(py)
     }
 
     /// Least and greatest value of each.
     #[getter]
     fn bounds(&self) -> Vec<(f64, f64)> {
+<<<<<<< HEAD
         let within = self.0.bounds();
         self.0.engine.unknowns().iter().map(|unknown| unknown.bounds_within(within)).collect()
+=======
+        self.0.free.bounds()
+>>>>>>> python-maps
     }
 
     /// The loss.
     fn loss(&self, py: Python<'_>, x: PyReadonlyArray1<'_, f64>) -> PyResult<f64> {
         let (own, x) = (Arc::clone(&self.0), numbers(&x));
-        wait(py, move || Ok(own.engine.loss(&own.at(&x)?)))
+        wait(py, move || Ok(own.engine.loss(&own.free.at(&x)?)))
     }
 
     /// The loss and its gradient.
@@ -223,7 +235,7 @@ impl Objective {
         x: PyReadonlyArray1<'_, f64>,
     ) -> PyResult<(f64, Bound<'py, PyArray1<f64>>)> {
         let (own, x) = (Arc::clone(&self.0), numbers(&x));
-        let (loss, gradient) = wait(py, move || Ok(own.engine.gradient(&own.at(&x)?)))?;
+        let (loss, gradient) = wait(py, move || Ok(own.engine.gradient(&own.free.at(&x)?)))?;
         Ok((loss, PyArray1::from_vec(py, gradient)))
     }
 
@@ -234,8 +246,8 @@ impl Objective {
         x: PyReadonlyArray1<'_, f64>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let (own, x) = (Arc::clone(&self.0), numbers(&x));
-        let sums: NormalEquations = wait(py, move || Ok(own.engine.normal_equations(&own.at(&x)?)))?;
-        let (all, order) = (PyDict::new(py), self.0.names.len());
+        let sums: NormalEquations = wait(py, move || Ok(own.engine.normal_equations(&own.free.at(&x)?)))?;
+        let (all, order) = (PyDict::new(py), self.0.free.names.len());
         let jtj: Bound<'py, PyArray2<f64>> = PyArray1::from_vec(py, sums.jtj).reshape([order, order])?;
         all.set_item("loss", sums.loss)?;
         all.set_item("residual", sums.residual)?;
@@ -285,17 +297,10 @@ impl Objective {
         view: Option<String>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let (own, x) = (Arc::clone(&self.0), numbers(&x));
-        let image = image.as_array();
-        let (shape, image) = (image.shape().to_vec(), image.iter().copied().collect::<Vec<f64>>());
+        let (shape, image) = (image.shape().to_vec(), numbers(&image));
         let product = move || {
-            let view = own.view(view.as_deref())?;
-            let [height, width] = own.size(view);
-            if shape != [height, width, 3] {
-                return Err(Refused::Array(format!(
-                    "an array of {shape:?}, where the view has {height} x {width} pixels of three numbers."
-                )));
-            }
-            let mut sums = vec![0.0; own.names.len()];
+            let view = own.free.view_of_image(view.as_deref(), &shape)?;
+            let mut sums = vec![0.0; own.free.names.len()];
             own.rows(&x, view, &mut |place, _, row| {
                 sums.iter_mut().zip(row).for_each(|(sum, slope)| *sum += image[place] * slope);
             })?;

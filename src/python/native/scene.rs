@@ -14,6 +14,7 @@ use skinfit_host::cli::{parse_effects, save_scene};
 use skinfit_view::values::Values;
 
 use crate::errors::Refused;
+use crate::maps::MapObjective;
 use crate::objective::Objective;
 use crate::paint::{self, Painted};
 use crate::params;
@@ -177,5 +178,17 @@ impl Scene {
     fn objective(&self, py: Python<'_>, hold_out: Vec<String>) -> PyResult<Objective> {
         let read = Arc::clone(&self.0);
         wait(py, move || Objective::of(&read, &hold_out))
+    }
+
+    /// The same as a function of whole maps, too, on a graphics adapter; part of its name may be given.
+    #[pyo3(signature = (maps, hold_out, adapter = None))]
+    fn map_objective(
+        &self,
+        py: Python<'_>,
+        maps: Vec<String>,
+        hold_out: Vec<String>,
+        adapter: Option<String>,
+    ) -> PyResult<MapObjective> {
+        MapObjective::of(py, Arc::clone(&self.0), &maps, hold_out, adapter)
     }
 }

@@ -30,6 +30,13 @@ def demo_file(cache: Path) -> Path:
     return skinfit.demo(cache=cache).path
 
 
+@pytest.fixture(scope="session")
+def adapter() -> None:
+    """What asks for it needs a graphics adapter."""
+    if os.environ.get("SKINFIT_NO_GPU_TESTS"):
+        pytest.skip("NOT CHECKED: SKINFIT_NO_GPU_TESTS is set")
+
+
 @pytest.fixture
 def scene(demo_file: Path, cache: Path) -> skinfit.Scene:
     return skinfit.load_file(demo_file, cache=cache)

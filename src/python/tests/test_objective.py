@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import skinfit
 from numpy.typing import NDArray
-from scipy.optimize import approx_fprime, minimize
+from scipy.optimize import minimize
 
 Vector = NDArray[np.float64]
 
@@ -96,16 +96,3 @@ def test_what_is_no_point_is_refused(objective: skinfit.Objective, x: Vector) ->
         objective.vjp(x, np.ones((2, 2, 3)))
     with pytest.raises(skinfit.ViewError, match="there is no view"):
         objective.image(x, "behind")
-
-
-def test_the_loss_has_its_gradient_in_pytorch(objective: skinfit.Objective, x: Vector) -> None:
-    torch = pytest.importorskip("torch", reason="NOT CHECKED: PyTorch is not installed")
-    import skinfit.torch
-
-    at = torch.tensor(x, requires_grad=True)
-    skinfit.torch.loss(objective, at).backward()
-    assert np.array_equal(at.grad.numpy(), objective.gradient(x))
-    at.grad = None
-    skinfit.torch.image(objective, at, "front").square().sum().backward()
-    slopes = approx_fprime(x, lambda y: float(np.sum(objective.image(y, "front") ** 2)), 1e-6)
-    assert np.allclose(at.grad.numpy(), slopes, rtol=1e-3)

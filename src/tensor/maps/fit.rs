@@ -8,7 +8,7 @@ use burn::tensor::{Tensor, TensorData};
 
 use super::layer::Layer;
 use super::layers::{layers, take_back};
-use super::parts::{Cut, cuts, most_samples};
+use super::parts::{cuts, most_samples, shades};
 use super::problem::{Observed, Problem};
 use super::task::MapTask;
 use super::{MapError, adam, cg};
@@ -21,12 +21,10 @@ use crate::fit::{self, FitOptions};
 use crate::model::cube::Cube;
 use crate::model::evaluate::Setup;
 use crate::model::params::{Column, Param};
-use crate::program::shading::ShadingError;
 use crate::samples::ViewSamples;
 use crate::samples::rows::Row;
 use crate::scene::{MapSolver, Scene};
-use crate::shader::PlanError;
-use crate::{Input, Inputs, Scatter, Shade, Shaded, SharedDevice, TensorError};
+use crate::{Input, Shaded, SharedDevice, TensorError};
 
 /// What was found.
 pub struct FittedMaps {
@@ -73,19 +71,9 @@ pub fn fit_maps(
     told: &mut dyn FnMut(&MapStep),
 ) -> Result<FittedMaps, MapError> {
     let clock = Instant::now();
-    // Told before the constants are fitted, which takes a while.
-    if task.scene.needs().atlas {
-        return Err(ShadingError::from(PlanError::no_atlas(task.scene.effects)).into());
-    }
-    // E_s follows its exponent, cube by cube; no other cube does.
-    let held = |param: &Param| is_sharpness(*param) && *param != Param::SpecularLobe;
-    let mut free = task.unknowns.iter().filter_map(|unknown| match unknown {
-        Unknown::Param(column) | Unknown::Own(_, column) => Some(column.param),
-        Unknown::Gain(..) => None,
-    });
-    if let Some(param) = free.find(held) {
-        return Err(MapError::Sharpness { param: param.name() });
-    }
+    // Told before the constants are fitted, which takes a while. E_s follows its exponent, cube by cube; no other cube
+    // does.
+    task.check(|param| is_sharpness(param) && param != Param::SpecularLobe)?;
     let fixed = Fixed::of(&task);
     let (initial, _) = fixed.solve_constants(&task.illumination, &task.observed, &task.start)?;
     let problem = problem(shared, &task, &fixed, &initial)?;
@@ -131,12 +119,7 @@ fn problem(
     let fields = setup.needs().fields;
     let cuts = cuts(&views, task.most_samples.unwrap_or_else(|| most_samples(shared, fields)));
     let shaded = Shaded { setup: *setup, params: &initial.params, columns, illumination: &task.illumination };
-    let shade = |cut: &Cut| -> Result<(Shade, Inputs), TensorError> {
-        let part = cut.views(&views);
-        let part: Vec<&ViewSamples> = part.iter().map(AsRef::as_ref).collect();
-        Shade::new(shared, &shaded, &part, Scatter::Exact)
-    };
-    let parts = cuts.iter().map(shade).collect::<Result<Vec<_>, _>>()?;
+    let parts = shades(shared, &shaded, &views, &cuts)?;
     let reads = |input: Input| parts.iter().all(|(shade, _)| shade.reads(input));
     let layers = layers(shared, task, &cuts, &reads, initial.params.scalar(Param::SpecularLobe))?;
     Ok(Problem::new(shared, parts, layers)?)
@@ -269,14 +252,15 @@ fn all_columns() -> Vec<Column> {
     Param::all().filter(|&param| !is_sharpness(param)).flat_map(of).collect()
 }
 
-fn column_tensor(shared: &SharedDevice, columns: &[Column], point: &Point) -> Tensor<1> {
+/// The columns' values.
+pub(super) fn column_tensor(shared: &SharedDevice, columns: &[Column], point: &Point) -> Tensor<1> {
     let values: Vec<f32> = columns.iter().map(|column| column.get(&point.params) as f32).collect();
     let count = values.len();
     Tensor::from_data(TensorData::new(values, [count]), shared.device())
 }
 
 /// A cube with its borders, as the shading operation takes it.
-fn cube_tensor(shared: &SharedDevice, cube: &Cube<f32>) -> Tensor<2> {
+pub(super) fn cube_tensor(shared: &SharedDevice, cube: &Cube<f32>) -> Tensor<2> {
     let texels = cube.padded().as_flattened().to_vec();
     let rows = texels.len() / 4;
     Tensor::from_data(TensorData::new(texels, [rows, 4]), shared.device())

@@ -11,18 +11,24 @@
 //! - [`layers`]: the maps that a fit begins with, and what they show; [`parts`]: samples in parts that fit a buffer
 //! - [`task`]: what is asked for; [`fit`]: the rounds over maps and constants
 //! - [`pictures`]: maps as images
+//! - [`function`]: images and their loss as functions of constants and maps, with gradients, for solvers elsewhere;
+//!   `evaluate`: a point of them on the device; `pixels`: what they are evaluated over
 
 pub mod adam;
 pub mod cg;
+mod evaluate;
 pub mod fit;
+pub mod function;
 pub mod layer;
 pub mod layers;
 pub mod parts;
 pub mod pictures;
+mod pixels;
 pub mod problem;
 pub mod task;
 
 pub use fit::{FittedMaps, fit_maps};
+pub use function::{MapFunction, MapGradients, MapInfo};
 pub use layer::{Grid, Layer};
 pub use task::MapTask;
 
@@ -111,12 +117,37 @@ pub enum MapError {
         /// The map's name.
         map: &'static str,
     },
+    /// A list of numbers is of another length.
+    #[error("{what}: {found} numbers, where {wanted} are asked for. Give one for each.")]
+    Length {
+        /// What the numbers are.
+        what: &'static str,
+        /// How many were given.
+        found: usize,
+        /// How many there are.
+        wanted: usize,
+    },
+    /// There is no such view.
+    #[error("there is no view {view}: there are {views}, counted from 0. Give one of them.")]
+    NoView {
+        /// Its number.
+        view: usize,
+        /// How many there are.
+        views: usize,
+    },
     /// The loss became no number.
     #[error("the loss is not finite after a step of {map}: its values or its priors are too large.")]
     NotFinite {
         /// The map's name.
         map: &'static str,
     },
+}
+
+impl MapError {
+    /// That a list has that length.
+    fn check_length(what: &'static str, found: usize, wanted: usize) -> Result<(), Self> {
+        if found == wanted { Ok(()) } else { Err(Self::Length { what, found, wanted }) }
+    }
 }
 
 impl From<TensorError> for MapError {

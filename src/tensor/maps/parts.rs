@@ -3,9 +3,9 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
-use crate::SharedDevice;
 use crate::model::fields::Fields;
 use crate::samples::{LANES, ViewSamples};
+use crate::{Inputs, Scatter, Shade, Shaded, SharedDevice, TensorError};
 
 /// Bytes that a sample takes in the largest buffer: base, view, normal, three corners' silhouettes and shares, a normal
 /// for the dapple, and the sample's share, 19 numbers of 32 bits at most, beside what files of rules declare.
@@ -31,12 +31,25 @@ pub fn most_samples(shared: &SharedDevice, fields: Fields) -> usize {
 /// The groups of all views in their order, in parts of at most so many samples; a group is never cut.
 #[must_use]
 pub fn cuts(views: &[&ViewSamples], most: usize) -> Vec<Cut> {
+    cut(views, most, |_| true)
+}
+
+/// The same, in parts of one view each.
+#[must_use]
+pub fn cuts_of_one_view(views: &[&ViewSamples], most: usize) -> Vec<Cut> {
+    cut(views, most, |[last, next]| last == next)
+}
+
+/// Parts that groups of two views may share where `together` says so.
+fn cut(views: &[&ViewSamples], most: usize, together: impl Fn([usize; 2]) -> bool) -> Vec<Cut> {
     let mut cuts = vec![Cut::default()];
     for (index, view) in views.iter().enumerate() {
         for group in 0..view.groups() {
             let size = (view.group_start[group + 1] - view.group_start[group]) as usize * LANES;
             let end = cuts.last().map_or(0, |cut| cut.samples.end);
-            match cuts.last_mut().filter(|cut| cut.samples.is_empty() || cut.samples.len() + size <= most) {
+            let has_room = |cut: &&mut Cut| cut.samples.is_empty() || cut.samples.len() + size <= most;
+            let takes = |cut: &&mut Cut| cut.pieces.last().is_none_or(|(last, _)| together([*last, index]));
+            match cuts.last_mut().filter(|cut| has_room(cut) && takes(cut)) {
                 Some(cut) => cut.push(index, group, size),
                 None => {
                     let mut cut = Cut { pieces: Vec::new(), samples: end..end };
@@ -49,7 +62,34 @@ pub fn cuts(views: &[&ViewSamples], most: usize) -> Vec<Cut> {
     cuts
 }
 
+/// The shading operation over each part of the samples, and inputs to start from.
+///
+/// # Errors
+/// When the device does not take the samples.
+pub fn shades(
+    shared: &SharedDevice,
+    shaded: &Shaded<'_>,
+    views: &[&ViewSamples],
+    cuts: &[Cut],
+) -> Result<Vec<(Shade, Inputs)>, TensorError> {
+    let shade = |cut: &Cut| {
+        let part = cut.views(views);
+        let part: Vec<&ViewSamples> = part.iter().map(AsRef::as_ref).collect();
+        Shade::new(shared, shaded, &part, Scatter::Exact)
+    };
+    cuts.iter().map(shade).collect()
+}
+
 impl Cut {
+    /// The view and the groups of it, where all are of one.
+    #[must_use]
+    pub fn one_view(&self) -> Option<(usize, Range<usize>)> {
+        match self.pieces.as_slice() {
+            [one] => Some(one.clone()),
+            _ => None,
+        }
+    }
+
     fn push(&mut self, view: usize, group: usize, size: usize) {
         self.samples.end += size;
         match self.pieces.last_mut() {
@@ -104,9 +144,11 @@ mod tests {
     fn parts_hold_every_group_once_in_order_and_no_more_samples_than_allowed() {
         let views = [view(&[1, 4, 4, 2]), view(&[3]), view(&[4, 4])];
         let views: Vec<&ViewSamples> = views.iter().collect();
-        assert_eq!(cuts(&views, usize::MAX).len(), 1);
-        for most in [1, 4, 5, 9, 100].map(|records| records * LANES) {
-            let cuts = cuts(&views, most);
+        assert_eq!((cuts(&views, usize::MAX).len(), cuts_of_one_view(&views, usize::MAX).len()), (1, 3));
+        let most = [1, 4, 5, 9, 100].map(|records| records * LANES);
+        for (most, apart) in most.into_iter().flat_map(|most| [(most, false), (most, true)]) {
+            let cuts = if apart { cuts_of_one_view(&views, most) } else { cuts(&views, most) };
+            assert!(!apart || cuts.iter().all(|cut| cut.one_view().is_some()));
             let mut end = 0;
             let (mut pixels, mut numbers) = (Vec::new(), Vec::new());
             for cut in &cuts {

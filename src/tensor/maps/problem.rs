@@ -37,8 +37,18 @@ struct Part {
 }
 
 /// What a pixel slot of an image shows, times its view's gain.
-fn shown(image: &[f32], slot: usize, gain: Gain) -> Batch<f64, 4> {
+pub(super) fn shown(image: &[f32], slot: usize, gain: Gain) -> Batch<f64, 4> {
     Batch(std::array::from_fn(|c| gain.channel(c) * f64::from(image[4 * slot + c])))
+}
+
+/// The residuals of a view's pixel slot, which counts so much and shows that, as the engine weighs them.
+pub(super) fn weighed(
+    residuals: Residuals,
+    view: &ObservedView,
+    (slot, pixel): (usize, f64),
+    shown: Batch<f64, 4>,
+) -> Weighted<Batch<f64, 4>> {
+    residuals.weigh(view.clip, shown, wanted(view, slot), Batch([pixel; 4]))
 }
 
 /// The target at a view's slot; 0 in channels that are not compared.
@@ -115,7 +125,7 @@ impl Problem {
                 let pixel = if *counts { f64::from(view.pixel_weight(slot)) } else { 0.0 };
                 total += pixel * channels as f64;
                 let shown = shown(&image, gains.len() / 4, *gain);
-                let rows = residuals.weigh(view.clip, shown, wanted(view, slot), Batch([pixel; 4]));
+                let rows = weighed(residuals, view, (slot, pixel), shown);
                 for (c, Weighted { scale, residual, .. }) in rows.each().enumerate() {
                     let (target, weight) = if c < channels && pixel > 0.0 {
                         // Where the slope of a robust loss is not its weight times the residual, the target gives way.
@@ -171,7 +181,7 @@ impl Problem {
                 let pixel = f64::from(view.pixel_weight(slot));
                 total += pixel * channels as f64;
                 let shown = shown(&image, first + slot, *gain);
-                let rows = residuals.weigh(view.clip, shown, wanted(view, slot), Batch([pixel; 4]));
+                let rows = weighed(residuals, view, (slot, pixel), shown);
                 sum += rows.loss.0[..channels].iter().sum::<f64>();
             }
             first += slots;

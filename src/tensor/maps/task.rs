@@ -3,12 +3,16 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use super::MapError;
 use crate::bake::Illumination;
 use crate::engine::view::ObservedView;
 use crate::engine::{Point, Unknown};
+use crate::model::params::Param;
 use crate::prepare::Baked;
+use crate::program::shading::ShadingError;
 use crate::scene::mesh::PosedMesh;
 use crate::scene::{MapKind, Scene};
+use crate::shader::PlanError;
 
 /// What is to be fitted.
 pub struct MapTask<'a> {
@@ -60,6 +64,18 @@ impl<'a> MapTask<'a> {
             unknowns: baked.unknowns(),
             most_samples: None,
             interrupt: None,
+        }
+    }
+
+    /// That tensors hold what the effects read, and that no constant is free that `held` names.
+    pub(super) fn check(&self, held: impl Fn(Param) -> bool) -> Result<(), MapError> {
+        if self.scene.needs().atlas {
+            return Err(ShadingError::from(PlanError::no_atlas(self.scene.effects)).into());
+        }
+        let mut free = self.unknowns.iter().filter_map(Unknown::column).map(|column| column.param);
+        match free.find(|&param| held(param)) {
+            Some(param) => Err(MapError::Sharpness { param: param.name() }),
+            None => Ok(()),
         }
     }
 }

@@ -100,6 +100,8 @@ fn refusal(error: &MapError, scene: &Path) -> Refusal {
         | MapError::NotUnwrapped { .. } => Some("--maps"),
         MapError::Tensor(_)
         | MapError::Filtered { .. }
+        | MapError::Length { .. }
+        | MapError::NoView { .. }
         | MapError::NotFinite { .. }
         | MapError::Constants(_)
         | MapError::Shading(_) => None,
@@ -117,6 +119,8 @@ fn refusal(error: &MapError, scene: &Path) -> Refusal {
         | MapError::Beside { .. }
         | MapError::Sharpness { .. }
         | MapError::Filtered { .. }
+        | MapError::Length { .. }
+        | MapError::NoView { .. }
         | MapError::NotUnwrapped { .. } => Refusal::new(words),
     }
 }

@@ -22,6 +22,7 @@ _native.loaded_from(_native.__file__)
 from .errors import (  # noqa: E402
     ArrayError,
     BakeError,
+    DeviceError,
     Error,
     Fault,
     FileError,
@@ -34,6 +35,7 @@ from .errors import (  # noqa: E402
     ViewError,
 )
 from .fit import Fit, FitOptions, FitSteps, Iteration, Scores, Step, fit, fit_steps, load_run  # noqa: E402
+from .maps import MapGradients, MapObjective  # noqa: E402
 from .objective import NormalEquations, Objective  # noqa: E402
 from .params import ParamInfo, Params  # noqa: E402
 from .rendering import Rendering  # noqa: E402
@@ -46,6 +48,7 @@ __version__ = _native.version()
 __all__ = [
     "ArrayError",
     "BakeError",
+    "DeviceError",
     "Error",
     "Fault",
     "FileError",
@@ -54,6 +57,8 @@ __all__ = [
     "FitOptions",
     "FitSteps",
     "Iteration",
+    "MapGradients",
+    "MapObjective",
     "NormalEquations",
     "Objective",
     "ParamError",

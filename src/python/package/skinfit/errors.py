@@ -37,6 +37,10 @@ class ArrayError(Error, ValueError):
     """An array has another shape or other numbers than asked for."""
 
 
+class DeviceError(Error, RuntimeError):
+    """There is no such graphics adapter, it has no room or was lost, or the library was built without what runs on it."""
+
+
 class FitError(Error, RuntimeError):
     """A fit was refused, or failed before it found anything."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,6 +12,7 @@ from . import _native
 from .errors import ArrayError
 
 Vector = NDArray[np.float64]
+Number = TypeVar("Number", np.float32, np.float64)
 
 
 @dataclass(frozen=True)
@@ -66,7 +68,7 @@ class Objective:
 
     def loss(self, x: ArrayLike) -> float:
         """The loss."""
-        return self._native.loss(_vector(x))
+        return self._native.loss(vector(x))
 
     def gradient(self, x: ArrayLike) -> Vector:
         """(K,): the loss' gradient."""
@@ -74,34 +76,40 @@ class Objective:
 
     def loss_and_gradient(self, x: ArrayLike) -> tuple[float, Vector]:
         """The loss and its gradient (K,), in one pass: `scipy.optimize.minimize(f.loss_and_gradient, f.start, jac=True)`."""
-        return self._native.loss_and_gradient(_vector(x))
+        return self._native.loss_and_gradient(vector(x))
 
     def normal_equations(self, x: ArrayLike) -> NormalEquations:
         """The loss with J'r and J'J, in one pass."""
-        return NormalEquations(**self._native.normal_equations(_vector(x)))
+        return NormalEquations(**self._native.normal_equations(vector(x)))
 
     def image(self, x: ArrayLike, view: str | None = None) -> Vector:
         """(height, width, 3): a view (the first, unless named) in linear Rec.709 radiance, premultiplied by coverage, times
         the view's gain; 0 where no skin is seen. Raises `ViewError` where there is no such view."""
-        return self._native.image(_vector(x), view)
+        return self._native.image(vector(x), view)
 
     def jvp(self, x: ArrayLike, v: ArrayLike, view: str | None = None) -> Vector:
         """(height, width, 3): how `image` moves as `x` moves along `v` (K,), the Jacobian times `v`."""
-        return self._native.jvp(_vector(x), _vector(v), view)
+        return self._native.jvp(vector(x), vector(v), view)
 
     def vjp(self, x: ArrayLike, image: ArrayLike, view: str | None = None) -> Vector:
         """(K,): `image` (height, width, 3) times the Jacobian of `Objective.image`: the gradient of their inner product."""
-        array = np.asarray(image, dtype=np.float64)
-        if array.ndim != 3:
-            raise ArrayError(f"an array of shape {array.shape} is no image. Give height x width x 3 numbers.")
-        return self._native.vjp(_vector(x), array, view)
+        return self._native.vjp(vector(x), image_array(image, np.float64), view)
 
     def __repr__(self) -> str:
         return f"Objective({', '.join(self.names)}; views {', '.join(self.views)})"
 
 
-def _vector(x: ArrayLike) -> Vector:
-    vector = np.asarray(x, dtype=np.float64)
-    if vector.ndim != 1:
-        raise ArrayError(f"an array of shape {vector.shape} is no vector. Give a number for each free constant.")
-    return vector
+def vector(x: ArrayLike) -> Vector:
+    """Constants, as the library takes them."""
+    array = np.asarray(x, dtype=np.float64)
+    if array.ndim != 1:
+        raise ArrayError(f"an array of shape {array.shape} is no vector. Give a number for each free constant.")
+    return array
+
+
+def image_array(image: ArrayLike, kind: type[Number]) -> NDArray[Number]:
+    """An image, as the library takes it."""
+    array = np.asarray(image, dtype=kind)
+    if array.ndim != 3:
+        raise ArrayError(f"an array of shape {array.shape} is no image. Give height x width x 3 numbers.")
+    return array

@@ -11,8 +11,9 @@ from typing import Any, NamedTuple, Union
 
 from . import _native, study
 from .described import describe
-from .errors import SkinfitWarning
+from .errors import ArrayError, SkinfitWarning
 from .fit import Fit, FitSteps, Step, fit, fit_steps
+from .maps import MapObjective
 from .objective import Objective
 from .params import Params
 from .rendering import Rendering
@@ -122,6 +123,23 @@ class Scene:
         native = self._native.objective(list(hold_out))
         self._warn_once(native.warnings)
         return Objective(native)
+
+    def map_objective(
+        self, *maps: str, hold_out: Sequence[str] = (), adapter: str | None = None
+    ) -> MapObjective:
+        """The same as a function of whole maps as well: `color`, `specular`, `attenuator`, `occlusion` (every vertex) and
+        `environment` (every texel of the cubes that light is looked up in), any of them; on a graphics adapter (the fastest,
+        unless part of a name is given).
+
+        `docs/maps.md` says which scenes have such maps: `SceneError` is raised for others, `ParamError` where a constant is
+        free that acts through cubes which stay, or are maps (`roughness` and `gloss`, and of `environment` `specular_lobe`),
+        `DeviceError` where there is no adapter or the library was built without (`features burn`).
+        """
+        if not maps:
+            raise ArrayError("no maps are named. Name some, or take objective(), which is of constants alone.")
+        native = self._native.map_objective(list(maps), list(hold_out), adapter)
+        self._warn_once(native.warnings)
+        return MapObjective(native)
 
     def ablate(self, **options: Any) -> Study:
         """What each effect and term is worth: `skinfit.ablate` of this scene alone."""
