@@ -35,6 +35,7 @@ from .errors import (  # noqa: E402
 )
 from .fit import Fit, FitOptions, FitSteps, Iteration, Scores, Step, fit, fit_steps, load_run  # noqa: E402
 from .objective import NormalEquations, Objective  # noqa: E402
+from .page import Page  # noqa: E402
 from .params import ParamInfo, Params  # noqa: E402
 from .rendering import Rendering  # noqa: E402
 from .scene import Scene, View, demo, load_dict, load_file  # noqa: E402
@@ -56,6 +57,7 @@ __all__ = [
     "Iteration",
     "NormalEquations",
     "Objective",
+    "Page",
     "ParamError",
     "ParamInfo",
     "Params",
