@@ -22,6 +22,8 @@ from . import _native
 from .command import run as run_command
 from .errors import Error, FitError, SkinfitWarning
 from .html import framed
+from .page import Page
+from .page import write as write_page
 from .params import Value
 from .progress import Progress
 from .study import copy
@@ -220,6 +222,15 @@ class Fit:
             _warn(said.told)
             return place.read_text(encoding="utf-8")
 
+    def page(self, file: FilePath | None = None, *, player: FilePath | None = None, title: str | None = None) -> Page:
+        """The fit as a page for a browser, with sliders, images and fits (`skinfit page`): one file that needs nothing else,
+        by default `page.html` in the run folder, which the report links to. It holds the scene's files: whoever has it has
+        these. `player`: see `skinfit.page`. Raises `FileError`."""
+        place = Path(file) if file is not None else self.run / "page.html"
+        cache = self._scenes[0]._cache_words() if self._scenes else []
+        words = [str(self.run), *cache, *([] if title is None else [f"--title={title}"])]
+        return write_page(words, place, player, self._scratch)
+
     def __repr__(self) -> str:
         if self._text:
             return self._text
@@ -322,6 +333,13 @@ def fit(
     while scenes are read and baked, nothing is there to keep, and `KeyboardInterrupt` is raised, as it is by Ctrl-C a second
     time. Python's lock is free meanwhile. Raises `FitError` and `SkinError` with the command line's paragraph. A fit that did
     not converge is no error: a `SkinfitWarning` says what to do.
+
+    >>> import skinfit
+    >>> found = skinfit.fit([skinfit.demo()], engine="cpu")
+    >>> found.converged, round(found.params["base_weight"], 3)
+    (True, 0.85)
+    >>> sorted(found.scores)
+    ['front', 'profile', 'three_quarter']
     """
     steps = fit_steps(scenes, run=run, resume=resume, hold_out=hold_out, **options)
     shown = Progress(progress)

@@ -1,14 +1,17 @@
 """A scene's loss and images as functions of JAX's, differentiable with respect to the free constants.
 
-    import jax, jax.numpy as jnp
-    import skinfit, skinfit.jax
-
-    f = skinfit.demo().objective()
-    loss = skinfit.jax.loss(f)                       # x (K,) to a number
-    image = skinfit.jax.image(f, "front")            # x (K,) to (height, width, 3)
-    x = jnp.array(f.start)
-    jax.jit(jax.value_and_grad(loss))(x)
-    jax.vjp(image, x)
+    >>> import jax, jax.numpy as jnp
+    >>> import skinfit, skinfit.jax
+    >>> scene = skinfit.demo()
+    >>> scene.params.free_only("base_weight", "rim_exponent")
+    >>> f = scene.objective()
+    >>> x = jnp.array(f.start)
+    >>> value, gradient = jax.jit(jax.value_and_grad(skinfit.jax.loss(f)))(x)
+    >>> value.shape, gradient.shape
+    ((), (2,))
+    >>> drawn, backward = jax.vjp(skinfit.jax.image(f, "front"), x)
+    >>> drawn.shape, backward(drawn)[0].shape
+    ((320, 320, 3), (2,))
 
 Everything is computed by skinfit on the processor, in float64, and handed over in the kind of `x`: float32, unless JAX
 was told `jax_enable_x64`. Gradients are of reverse mode, first derivatives alone; `jax.jit` calls back, and `jax.vmap`
@@ -46,7 +49,8 @@ def loss(objective: Objective) -> Callable[[jax.Array], jax.Array]:
         return (slope * gradient,)
 
     value.defvjp(forward, backward)
-    return value
+    function: Callable[[jax.Array], jax.Array] = value
+    return function
 
 
 def image(objective: Objective, view: str | None = None) -> Callable[[jax.Array], jax.Array]:
@@ -64,7 +68,8 @@ def image(objective: Objective, view: str | None = None) -> Callable[[jax.Array]
         return (_called(lambda at, weights: objective.vjp(at, weights, view), x.shape, x, slope),)
 
     value.defvjp(forward, backward)
-    return value
+    function: Callable[[jax.Array], jax.Array] = value
+    return function
 
 
 def _called(function: Callable[..., Any], shape: tuple[int, ...], *arrays: jax.Array) -> jax.Array:

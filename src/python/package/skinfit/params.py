@@ -52,6 +52,15 @@ class Params(MutableMapping[str, Value]):
     `params["hilite"]` is a float, or three where channels differ; `params["hilite"] = 0.5` and
     `params["hilite"] = (0.7, 0.6, 0.5)` set it. `free` and `fix` say what a fit moves, `info` has the whole row.
     A parameter that is set to three values and is free moves in each channel. Nothing can be removed.
+
+    >>> import skinfit
+    >>> params = skinfit.demo().params
+    >>> params["hilite"] = (0.7, 0.6, 0.5)
+    >>> params.free_only("base_weight", per_channel=["hilite"])
+    >>> [row.name for row in params.rows() if row.free != "fixed"]
+    ['base_weight', 'hilite']
+    >>> params.info("rim_exponent").bounds
+    (0.25, 16.0)
     """
 
     def __init__(self, scene: _native.Scene) -> None:
