@@ -4,7 +4,7 @@
 //! ones follow from names, so that the same export gives the same.
 //!
 //! Keys and numbers are those of the importers' scripting classes (Unity's scripting reference, `TextureImporter`,
-//! `IHVImageFormatImporter`) as Unity 2022.3 saves them. All that matters is spelt out: what a `.meta` leaves out is not what
+//! `IHVImageFormatImporter`), in the form of Unity 2022.3. All that matters is spelt out: what a `.meta` leaves out is not what
 //! Unity takes for a file without one.
 
 use std::fmt;
