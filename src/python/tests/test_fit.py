@@ -156,6 +156,9 @@ def test_other_threads_go_on_while_a_fit_runs(scene: skinfit.Scene) -> None:
     assert ticks > 50 * seconds, (ticks, seconds)
 
 
+# Of what a shell runs in the background Ctrl-C is ignored, until somebody says otherwise.
+_HEARD = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+
 _INTERRUPTED = """
     import sys, time, warnings
     import skinfit
@@ -172,7 +175,7 @@ _INTERRUPTED = """
 @pytest.mark.skipif(sys.platform == "win32", reason="there is no such signal")
 def test_ctrl_c_keeps_what_there_is(small_file: Path, cache: Path, tmp_path: Path) -> None:
     script = textwrap.dedent(_INTERRUPTED.format(scene=str(small_file), cache=str(cache), run=str(tmp_path / "run")))
-    with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen([sys.executable, "-c", _HEARD + script], stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "step\n"
         process.send_signal(signal.SIGINT)
@@ -199,7 +202,7 @@ _AT_WORK = """
 @pytest.mark.skipif(sys.platform == "win32", reason="there is no such signal")
 def test_ctrl_c_is_heard_within_a_second_while_the_library_works(demo_file: Path, cache: Path) -> None:
     script = textwrap.dedent(_AT_WORK.format(scene=str(demo_file), cache=str(cache)))
-    with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen([sys.executable, "-c", _HEARD + script], stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None and process.stdout.readline() == "begun\n"
         time.sleep(0.5)
         sent = time.time()

@@ -19,6 +19,7 @@ def test_the_notebook_runs(not_checked: NotChecked) -> None:
     pages = [output["data"]["text/html"] for output in shown if "text/html" in output.get("data", {})]
     assert any("<table>" in page for page in pages), "the parameter table is shown"
     assert any("<iframe" in page for page in pages), "the report is shown"
+    assert any("image/png" in output.get("data", {}) for output in shown), "the image is shown"
     said = "".join(output.get("text", "") for output in shown)
     left_out = [line for line in said.splitlines() if line.startswith("NOT CHECKED")]
     assert not left_out or os.environ.get("SKINFIT_NO_DATA_TESTS"), left_out

@@ -76,7 +76,7 @@ def test_the_image_is_the_drawn_one(objective: skinfit.Objective, demo_file, cac
 def test_scipy_finds_what_the_fit_finds(objective: skinfit.Objective, fitted: skinfit.Fit) -> None:
     found = minimize(
         objective.loss_and_gradient, objective.start, jac=True, bounds=objective.bounds, method="L-BFGS-B",
-        options={"maxiter": 200},
+        options={"maxiter": 40},
     )
     assert fitted.loss <= found.fun < 0.1 * objective.loss(objective.start)
 

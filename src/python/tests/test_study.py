@@ -51,7 +51,9 @@ def test_changed_values_go_into_a_study(scene: skinfit.Scene, tmp_path: Path) ->
 def test_ctrl_c_ends_a_study(demo_file: Path, tmp_path: Path) -> None:
     script = textwrap.dedent(
         f"""
-        import skinfit
+        import signal, skinfit
+        # Of what a shell runs in the background Ctrl-C is ignored, until somebody says otherwise.
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         scene = skinfit.load_file({str(demo_file)!r})
         print("begun", flush=True)
         try:

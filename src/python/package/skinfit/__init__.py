@@ -11,7 +11,7 @@
 
 Images are linear Rec.709 radiance, premultiplied by coverage, row by row from the top; angles are degrees, lengths the
 scene's own. What is refused raises an `Error` of a class a kind, with a paragraph on what to do; Ctrl-C ends what is under
-way; other threads go on meanwhile. `skinfit.torch` has the same as a function of PyTorch's.
+way; other threads go on meanwhile. `skinfit.torch` and `skinfit.jax` have the same as functions of PyTorch's and JAX's.
 """
 
 from . import _native
