@@ -97,11 +97,10 @@ fn list(scene: &Scene) -> String {
     names.join(", ")
 }
 
-/// What parameters of the skin stay within, whatever their order.
+/// What parameters of the skin stay within.
 fn bounds(scene: &Scene) -> String {
     let own = scene.fit.bounds.iter().filter(|(param, _)| !param.is_of_scene());
-    let mut all: Vec<String> = own.map(|(param, [a, b])| format!("{} in [{a}, {b}]", param.name())).collect();
-    all.sort_unstable();
+    let all: Vec<String> = own.map(|(param, [a, b])| format!("{} in [{a}, {b}]", param.name())).collect();
     all.join(", ")
 }
 

@@ -114,6 +114,9 @@ fn goes_on(scene: &FitScene, file: &Path) -> Result<(), Refusal> {
     {
         return Err(other("other free constants"));
     }
+    if kept.fit.bounds != values.bounds {
+        return Err(other("other bounds"));
+    }
     let text = scene_text(&scene.path, changes(values, &names(values.effects)))?;
     let unreadable = |error| Refusal::new(format!("{}: {error}", file.display()));
     let of_file = std::fs::read_to_string(file).map_err(unreadable)?;

@@ -10,16 +10,9 @@ use pyo3::types::{PyDict, PyDictMethods};
 use pyo3::{Bound, PyResult, Python, pyclass, pymethods};
 use skinfit_core::engine::cpu::CpuEngine;
 use skinfit_core::engine::reference::{PixelColumns, Reference};
-<<<<<<< HEAD
-use skinfit_core::engine::{NormalEquations, Objective as _, Point, Unknown};
-use skinfit_core::model::bounds::Bounds;
-use skinfit_core::prepare::{NamedScene, Observed, untied};
-use skinfit_core::scene::{short, suggestion};
-=======
 use skinfit_core::engine::view::ObservedView;
 use skinfit_core::engine::{NormalEquations, Objective as _};
 use skinfit_core::prepare::Observed;
->>>>>>> python-maps
 
 use crate::arrays::numbers;
 use crate::errors::Refused;
@@ -44,20 +37,7 @@ type Take<'a> = &'a mut dyn FnMut(usize, f64, &[f64]);
 impl Objective {
     /// Of a scene as it stands, over the views that have a target and are not held out.
     pub(crate) fn of(read: &Read, hold_out: &[String]) -> Result<Self, Refused> {
-<<<<<<< HEAD
-        let values = read.values();
-        let mut loaded = read.loaded.clone();
-        loaded.scene.params.clone_from(&values.params);
-        loaded.scene.fit.bounds.clone_from(&values.bounds);
-        loaded.scene.fit.free = untied(&values.free, &values.params, &[]);
-        let scene = NamedScene { name: String::new(), loaded };
-        let marked = NamedScene::marked(std::slice::from_ref(&scene), hold_out);
-        let marks = marked.map_err(skinfit_core::prepare::PrepareError::from)?.concat();
-        let (baked, _) = scene.loaded.bake()?.hold_out(&marks)?;
-        let observed = baked.sample()?.observe()?;
-=======
         let observed = observe(read, hold_out, |_| Ok(()))?;
->>>>>>> python-maps
         let engine = observed.engine()?;
         let Observed { baked, views } = observed;
         Ok(Self(Arc::new(Observing { free: Free::new(baked), views, engine })))
@@ -65,59 +45,6 @@ impl Objective {
 }
 
 impl Observing {
-<<<<<<< HEAD
-    /// The point of these values, each of which its unknown may have.
-    fn at(&self, x: &[f64]) -> Result<Point, Refused> {
-        let unknowns = self.engine.unknowns();
-        if x.len() != unknowns.len() {
-            let (given, wanted) = (x.len(), unknowns.len());
-            let names = self.names.join(", ");
-            return Err(Refused::Array(format!(
-                "{given} values, where {wanted} are free: {names}. Give one for each."
-            )));
-        }
-        let mut point = self.observed.start();
-        for ((unknown, &value), name) in unknowns.iter().zip(x).zip(&self.names) {
-            let (lower, upper) = unknown.bounds_within(self.bounds());
-            if !value.is_finite() || !(lower..=upper).contains(&value) {
-                let [lower, upper] = [lower, upper].map(short);
-                return Err(Refused::Param(format!(
-                    "{name} = {value} is out of bounds. Give a number from {lower} to {upper}."
-                )));
-            }
-            unknown.set(&mut point, value);
-        }
-        Ok(point)
-    }
-
-    /// What the scene bounds its parameters by.
-    fn bounds(&self) -> &[Bounds] {
-        std::slice::from_ref(&self.observed.scene.fit.bounds)
-    }
-
-    /// The number of a view.
-    fn view(&self, name: Option<&str>) -> Result<usize, Refused> {
-        let Some(name) = name else { return Ok(0) };
-        let views = &self.observed.scene.views;
-        let known: Vec<&str> = views.iter().map(|view| view.name.as_str()).collect();
-        let unknown = || {
-            let scene = self.observed.scene.path.display();
-            Refused::View(format!(
-                "{scene}: there is no view `{name}` to be fitted. {}.",
-                suggestion(name, &known)
-            ))
-        };
-        views.iter().position(|view| view.name == name).ok_or_else(unknown)
-    }
-
-    /// Height and width of a view.
-    fn size(&self, view: usize) -> [usize; 2] {
-        let camera = &self.observed.scene.views[view].camera;
-        [camera.height as usize, camera.width as usize]
-    }
-
-=======
->>>>>>> python-maps
     /// Have `take` see each pixel and channel of a view: radiance premultiplied by the coverage, times the gain.
     fn rows(&self, x: &[f64], view: usize, take: Take<'_>) -> Result<(), Refused> {
         let Free { baked, unknowns, .. } = &self.free;
@@ -214,12 +141,7 @@ impl Objective {
     /// Least and greatest value of each.
     #[getter]
     fn bounds(&self) -> Vec<(f64, f64)> {
-<<<<<<< HEAD
-        let within = self.0.bounds();
-        self.0.engine.unknowns().iter().map(|unknown| unknown.bounds_within(within)).collect()
-=======
         self.0.free.bounds()
->>>>>>> python-maps
     }
 
     /// The loss.

@@ -50,6 +50,11 @@ def test_a_fit_stays_within_the_bounds_that_are_set(
     # The folder's scene file holds them for the command line.
     program("fit", tmp_path / "run" / "scene.toml", "-o", tmp_path / "again", "--cache", cache, "--engine", "cpu")
     assert numbers(report_of(tmp_path / "again"))["unknowns"] == numbers(found.report)["unknowns"]
+    with pytest.raises(skinfit.ParamError, match="out of bounds"):
+        scene.objective().loss([0.9, 2.0])
+    scene.params.bound("base_weight", 0.5, 0.7)
+    with pytest.raises(skinfit.FitError, match="other bounds"):
+        scene.fit(run=tmp_path / "run", resume=True)
     with pytest.raises(skinfit.ParamError, match="no such interval"):
         scene.params.bound("base_weight", 0.8, 0.5)
     scene.params.bound("base_weight")

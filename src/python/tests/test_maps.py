@@ -42,7 +42,7 @@ def test_maps_have_names_shapes_and_bounds(both: tuple[skinfit.MapObjective, ski
     assert list(maps) in (list(SKIN), ["irradiance", "lobe", "hilite"]) and list(f.map_bounds) == list(maps)
     for name, array in maps.items():
         ends = {"color": (3,), "irradiance": (4,), "lobe": (4,), "hilite": (4,)}.get(name, ())
-        assert array.dtype == np.float32 and array.shape[-1:] == ends or array.ndim in (1, 2), name
+        assert array.dtype == np.float32 and (array.shape[-1:] == ends or array.ndim in (1, 2)), name
     assert f.adapter in repr(f)
 
 

@@ -30,11 +30,12 @@ pub(in crate::export::material) fn text(parts: &Parts<'_>, title: &str) -> Resul
     let properties: String = parts.bound().map(property).chain(tuned.iter().map(of_constant)).collect();
     let filled = parts.filled(&MEMBERS, "                ")?;
     Ok(SHADER
-        .replace("PROPERTIES\n", &properties)
-        .replace("BUFFER\n", &buffer(&tuned))
-        .replace("FILLED\n", &filled)
-        .replace("TITLE", &title.replace(['"', '/', '\\'], ""))
-        .replace("SHADER", &parts.shader.replace('"', "")))
+        // Names first: what they are replaced by has none of the marks below.
+        .replace("@TITLE@", &title.replace(['"', '/', '\\', '@'], ""))
+        .replace("@INCLUDE@", &parts.shader.replace(['"', '@'], ""))
+        .replace("@PROPERTIES@\n", &properties)
+        .replace("@BUFFER@\n", &buffer(&tuned))
+        .replace("@FILLED@\n", &filled))
 }
 
 /// A constant as a property. A *Vector* has its numbers as they are; a *Color* would be decoded from sRGB.
@@ -73,9 +74,9 @@ fn buffer(tuned: &[Tuned]) -> String {
 const SHADER: &str = r#"// Linear radiance: the player's colour space is Linear. Maps other than the colour map, and all cubes, are imported with
 // sRGB off; the normal map as an ordinary texture, as it is read as stored. Occlusion is the first number of the second
 // texture coordinates.
-Shader "Skinfit/TITLE" {
+Shader "Skinfit/@TITLE@" {
     Properties {
-PROPERTIES
+@PROPERTIES@
     }
     SubShader {
         Tags { "RenderType" = "Opaque" "Queue" = "Geometry" }
@@ -85,8 +86,8 @@ PROPERTIES
             #pragma vertex skin_vertex
             #pragma fragment skin_fragment
             #include "UnityCG.cginc"
-BUFFER
-            #include "SHADER"
+@BUFFER@
+            #include "@INCLUDE@"
 
             struct OfMesh {
                 float4 position : POSITION;
@@ -127,7 +128,7 @@ BUFFER
 
             float4 skin_fragment(Between from) : SV_Target {
                 SkinfitSurface at;
-FILLED
+@FILLED@
                 return skinfit_shade(at);
             }
             ENDHLSL
