@@ -43,10 +43,10 @@ fn quad(model: SpecularModel, slopes: impl Fn(usize, usize) -> [f64; 2]) -> Bake
         scene.maps = Maps { normal, ..Maps::default() };
         scene.quality.samples_per_axis = 1;
         scene.choices.specular_model = model;
-        scene.params.set(Param::BaseWeight, [0.0; 3]);
+        scene.params.set(Param::BaseWeight, 0.0);
         scene.params.set(
             Param::from_identifier("roughness").unwrap(),
-            [if model == SpecularModel::Ggx { 0.5 } else { 0.25 }; 3],
+            if model == SpecularModel::Ggx { 0.5 } else { 0.25 },
         );
     })
 }
