@@ -183,8 +183,8 @@ fn a_material_for_unity_is_a_folder_beside_the_cubes() {
     assert!(saved.contains(&format!("    - _SKINFIT_OCCLUSION: {occlusion}\n")), "{saved}");
     assert!(shader.contains(&format!("Float) = {occlusion}\n")), "{shader}");
     // A name that stands in the shader's text, too.
-    export("other/SHADER_BUFFER.mat").done();
-    let named = sandbox.text("other/SHADER_BUFFER.shader").replace("SHADER_BUFFER", "Skin");
+    export("baked/SHADER_BUFFER.mat").done();
+    let named = sandbox.text("baked/SHADER_BUFFER.shader").replace("SHADER_BUFFER", "Skin");
     assert_eq!(named, shader);
     // Once more, nothing changes, and what Unity has made of a `.meta` stays.
     let before = sandbox.files();
