@@ -100,8 +100,8 @@ pub(super) const NORMALS: Ways = Ways {
     method: "Images with mean normals alone, and with specular lobes widened by how far the normals below a sample are apart, both \
              of filtered maps; the reference has many samples a pixel, each of the finest texels. Errors hold what more samples change \
              beside bumps, at outlines, the same for every way. Seconds are those of baking, tracing and one pass, nothing cached.",
-    effect: "normal_map",
-    idle: "the effect normal_map is off",
+    effect: "light_specular",
+    idle: "the effect light_specular is off, whose highlights bumps widen",
     ways: &[
         ("trilinear, none", |scene| filtered(scene, TextureFilter::Trilinear, NormalFilter::None)),
         ("trilinear, toksvig", |scene| filtered(scene, TextureFilter::Trilinear, NormalFilter::Toksvig)),
