@@ -314,7 +314,7 @@ fn ways_to_the_skys_light_are_measured_beside_rays() {
 #[test]
 fn bumps_below_a_sample_are_measured_beside_many_samples() {
     let sandbox = Sandbox::new();
-    sandbox.edit("\"reflection\"]", "\"reflection\", \"normal_map\", \"lights\", \"light_specular\"]");
+    sandbox.edit("\"reflection\"]", "\"reflection\", \"lights\", \"light_specular\"]");
     sandbox.edit("file = \"env.exr\"", "file = \"env.exr\"\nlights = 2");
     done(sandbox.run(&["tradeoff", "scene.toml", "-o", "cost", "--axis", "normal_filter"]));
     let settings = settings(&sandbox, "cost", "normal_filter");
