@@ -92,8 +92,10 @@ fn one_sample_over_bumps_shows_the_highlight_of_many() {
         let one = |normals| error(&many, &on_cpu(&with(&baked, TextureFilter::Trilinear, normals), 1));
         let (narrow, wide) = (one(NormalFilter::None), one(NormalFilter::Toksvig));
         // Slopes of 0.15 beside a lobe of 0.25 move its peak by a third; what is left is that sixty bumps are no whole
-        // distribution, and that the lobe's other factors stay those of the mean normal.
-        assert!(narrow > 0.15 && wide < 0.5 * narrow, "{model:?}: {narrow} {wide}");
+        // distribution, and that the lobe's other factors stay those of the mean normal. That of ggx is no bell, of which
+        // the sum with bumps would be one again.
+        let left = if model == SpecularModel::Ggx { 0.7 } else { 0.5 };
+        assert!(narrow > 0.15 && wide < left * narrow, "{model:?}: {narrow} {wide}");
     }
 }
 
