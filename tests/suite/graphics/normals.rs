@@ -18,7 +18,7 @@ use crate::scene_folder::{SCENE, SceneFolder};
 const TEXELS: usize = 1024;
 const LAMP: &str = "
 [[light]]
-name = \"Lamp\"
+name = \"Raking\"
 type = \"directional\"
 direction = [-0.5, -0.3, -1.0]
 irradiance = 3.0
