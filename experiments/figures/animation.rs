@@ -1,15 +1,15 @@
 //! docs/animation.json, and the plot beside it: occlusion of a head that nods and grimaces, baked for each frame of its clip,
 //! or for fewer poses.
 //!
-//! Rays of a vertex are drawn by where it stands, so a vertex that moves has others in each frame, and their noise is
-//! another too. Two bakes beside the program's own tell that noise from what truly changes: one with many rays, and
-//! one whose rays are drawn by where each vertex stands at the beginning. `flicker.rs` says how frames are compared.
+//! Rays of a vertex are drawn by where it stands at rest, and turn with the surface. Two bakes beside the program's own
+//! tell their noise from what truly changes: one with many rays, and one whose rays are drawn by where each vertex
+//! stands in the frame, so that their noise is another in each. `flicker.rs` says how frames are compared.
 
 use std::path::PathBuf;
 
 use serde_json::{Value, json};
 use skinfit::bake::occlusion::bake_occlusion;
-use skinfit::bake::{PoseBake, VertexOcclusion, bake_pose};
+use skinfit::bake::{PoseBake, bake_pose};
 use skinfit::prepare::{ClipOcclusion, Loaded, PrepareOptions};
 use skinfit::scene::Scene;
 use skinfit::scene::animation::Animation;
@@ -58,7 +58,7 @@ pub(crate) fn measure(lab: &Lab) -> Result<Value> {
     scene.quality.occlusion_rays = MANY;
     let (fine, fine_seconds) = clip.baked(&scene);
     let fine = clip.open(&fine)?;
-    let held = clip.held(rays);
+    let drawn_anew = clip.drawn_anew(rays);
     // Seconds of so many bakes, by the frame.
     let of_poses = |count: usize| seconds * count as f64 / clip.poses.len() as f64;
     let way = |name: &str, rate, seconds, frames| Way { name: name.to_owned(), rate, seconds, frames };
@@ -68,7 +68,7 @@ pub(crate) fn measure(lab: &Lab) -> Result<Value> {
         ways.push(way(&format!("{rate} a second"), Some(rate), Some(of_poses(count)), frames));
     }
     ways.push(way("many rays", Some(FPS), Some(fine_seconds), fine.clone()));
-    ways.push(way("same rays", Some(FPS), None, held));
+    ways.push(way("other rays", Some(FPS), None, drawn_anew));
     plot(&lab.root.join("docs/images/occlusion_flicker.svg"), &ways, FPS)?;
     ways.push(way("one bake", Some(0), Some(of_poses(1)), vec![each[0].clone(); each.len()]));
     let (frames, spent) = clip.by_targets(loaded)?;
@@ -172,17 +172,10 @@ impl Clip {
         Ok((last.div_ceil(step) + 1, self.open(&frames.ok_or("two bakes are not of one mesh")?)?))
     }
 
-    /// Each frame's own bake, but each vertex' rays drawn by where it stands at the beginning: the frames are given as
-    /// morph targets of the first, one of them at weight 1.
-    fn held(&self, rays: u32) -> Vec<Vec<f32>> {
-        let pose = |weights: &[f32]| {
-            let frame = weights.iter().position(|&weight| weight > 0.5).map_or(0, |target| target + 1);
-            self.poses[frame].clone()
-        };
-        let VertexOcclusion { base, morphs } = bake_occlusion(&pose, self.poses.len() - 1, rays);
-        let sum = |added: &Vec<f32>| base.iter().zip(added).map(|(base, added)| base + added).collect();
-        let frames = std::iter::once(base.clone()).chain(morphs.iter().map(sum));
-        frames.map(|open: Vec<f32>| self.of_skin(&open)).collect()
+    /// Each frame's own bake, with rays that are drawn by where each vertex stands in it.
+    fn drawn_anew(&self, rays: u32) -> Vec<Vec<f32>> {
+        let open = |pose: &PosedMesh| self.of_skin(&bake_occlusion(&|_| pose.clone(), 0, rays).base);
+        self.poses.iter().map(open).collect()
     }
 
     /// Each frame by what is baked once for each morph target, as `render --occlusion targets` has it, and the seconds of

@@ -18,6 +18,7 @@ mod flicker;
 mod lab;
 mod light;
 mod lobes;
+mod normals;
 mod page;
 mod pages;
 mod passes;
@@ -55,6 +56,7 @@ const FILES: &[(&str, Measure)] = &[
     ("docs/closeup.json", closeup::measure),
     ("docs/portrait.json", portrait::measure),
     ("docs/animation.json", animation::measure),
+    ("docs/normals.json", normals::measure),
     ("docs/page.json", page::measure),
     ("docs/window.json", window::software),
     ("docs/window_card.json", window::graphics_card),

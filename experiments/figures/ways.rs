@@ -9,7 +9,7 @@ use crate::studies::{number, study_of};
 const LIT: [&str; 2] = ["forest", "sunrise"];
 const SCATTERING: [&str; 3] = ["forest", "sunrise", "studio"];
 
-const LIGHT: [&str; 10] = [
+const LIGHT: [&str; 11] = [
     "sky_lights",
     "visibility",
     "specular_visibility",
@@ -19,6 +19,7 @@ const LIGHT: [&str; 10] = [
     "bounces",
     "rays",
     "texture_filter",
+    "normal_filter",
     "shadows",
 ];
 const DIFFUSION: [&str; 8] =

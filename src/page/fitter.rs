@@ -168,6 +168,7 @@ impl UnderWay {
             resume: self.begun.then(|| state.clone()),
             state: Some(state),
             interrupt: Some(Arc::clone(&over)),
+            bounds: self.scenes.bounds(),
             widths: self.scenes.widths(),
             ..FitOptions::default()
         };

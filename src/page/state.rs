@@ -243,7 +243,7 @@ fn gains(session: &Session) -> Option<Gains> {
 
 fn row(session: &Session, values: &Values, param: Param) -> Row {
     let info = param.info();
-    let apart = values.by_channel(param);
+    let (apart, (lower, upper)) = (values.by_channel(param), values.bounds.of(param));
     let columns = if apart { Column::per_channel(param).to_vec() } else { vec![Column::tied(param)] };
     let slider = |column: Column| {
         let range = session.range(column);
@@ -267,7 +267,7 @@ fn row(session: &Session, values: &Values, param: Param) -> Row {
         meaning: info.meaning,
         source: info.source,
         unit: info.unit,
-        bounds: format!("{} to {}", info.lower, info.upper),
+        bounds: format!("{lower} to {upper}"),
         rgb: info.rgb,
         free: values.freedom(param) != Freedom::Fixed,
         apart,

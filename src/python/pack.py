@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Pack the wheel of a library that is compiled already, as one that `cargo test --workspace` has made of the parts that all
-else there is made of: `pack.py LIBRARY FOLDER` prints the wheel's path.
+else there is made of: `pack.py LIBRARY FOLDER [PLAYER]` prints the wheel's path. With the page without a scene that
+`src/page/build` has made, `PLAYER`, the wheel can write pages by itself.
 
 `pip install ./src/python` compiles by itself; the two wheels hold the same files.
 """
@@ -51,12 +52,14 @@ def tag() -> str:
     return f"{ABI}-{re.sub('[-.]', '_', sysconfig.get_platform())}"
 
 
-def files(library: Path) -> dict[str, bytes]:
+def files(library: Path, player: Path | None) -> dict[str, bytes]:
     """Every file of the wheel, by its name in it."""
     sources = (path for path in sorted(PACKAGE.rglob("*")) if path.is_file() and "__pycache__" not in path.parts)
     found = {path.relative_to(PACKAGE).as_posix(): path.read_bytes() for path in sources}
     ending = "pyd" if sys.platform == "win32" else "abi3.so"
     found[f"skinfit/_native.{ending}"] = library.read_bytes()
+    if player is not None:
+        found["skinfit/player.html"] = player.read_bytes()
     info = f"skinfit-{version()}.dist-info"
     found |= {f"{info}/{name}": text.encode() for name, text in metadata().items()}
     record = io.StringIO()
@@ -70,13 +73,13 @@ def files(library: Path) -> dict[str, bytes]:
 
 
 def main() -> None:
-    if len(sys.argv) != 3:
-        raise SystemExit("usage: pack.py LIBRARY FOLDER")
-    library, folder = map(Path, sys.argv[1:])
+    if len(sys.argv) not in (3, 4):
+        raise SystemExit("usage: pack.py LIBRARY FOLDER [PLAYER]")
+    library, folder, *player = map(Path, sys.argv[1:])
     folder.mkdir(parents=True, exist_ok=True)
     wheel = folder / f"skinfit-{version()}-{tag()}.whl"
     with zipfile.ZipFile(wheel, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as packed:
-        for name, content in files(library).items():
+        for name, content in files(library, player[0] if player else None).items():
             packed.writestr(name, content)
     print(wheel)
 

@@ -221,7 +221,7 @@ fn known(outcome: &Outcome, i: usize, j: usize, r: f64) -> Option<f64> {
 }
 
 fn unknown(outcome: &UnknownOutcome, name: &str) -> UnknownSummary {
-    let (lower, upper) = outcome.unknown.bounds();
+    let (lower, upper) = outcome.bounds;
     UnknownSummary {
         name: name.to_owned(),
         start: outcome.start,

@@ -1,6 +1,7 @@
 //! What one edits: the constants, what a fit may move, which effects are on, which views it leaves out.
 
 use crate::engine::Point;
+use crate::model::bounds::Bounds;
 use crate::model::effects::{Effect, Effects, Form};
 use crate::model::gain::Gain;
 use crate::model::params::{Channels, Column, Param, Params};
@@ -23,6 +24,8 @@ pub struct Values {
     pub white_balance: bool,
     /// What else a fit moves.
     pub free: Vec<Column>,
+    /// What these stay within, where that is less than the table's.
+    pub bounds: Bounds,
     /// The parameters that the scene's file leaves free: what is free again stands where it stood.
     order: Vec<Param>,
     /// What shows a value a channel, whether or not a fit moves it.
@@ -61,6 +64,7 @@ impl Values {
             free_gains: scene.fit.free_gains,
             white_balance: scene.fit.white_balance,
             free: scene.fit.free.clone(),
+            bounds: scene.fit.bounds.clone(),
             order: scene.fit.free.iter().map(|column| column.param).collect(),
             apart: Vec::new(),
             effects: scene.effects,

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "what fails in a test's helper fails the test")]
 
+mod bounded;
 mod correlated;
 mod damaged;
 mod image;

@@ -8,6 +8,7 @@ use std::path::Path;
 use bevy_mikktspace::{Geometry, TangentSpace, generate_tangents};
 use glam::{DMat4, Vec2, Vec3, Vec4};
 use serde_json::Value;
+use skinfit::model::bounds::Bounds;
 use skinfit::model::dapple::Dapple;
 use skinfit::model::effects::{Effects, Form, Lookups, Silhouette};
 use skinfit::model::params::Params;
@@ -172,6 +173,7 @@ pub(crate) fn bare_scene(effects: Effects) -> Scene {
         fit: FitSettings {
             white_balance: false,
             free: Vec::new(),
+            bounds: Bounds::default(),
             loss: Loss::L2,
             free_gains: false,
             cameras: false,

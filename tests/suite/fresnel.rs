@@ -26,10 +26,10 @@ const EFFECTS: &str = "\"diffuse\", \"normal_map\", \"occlusion\", \"rim\", \"li
 /// The choices that are told apart: a scene's lines of `[model]`.
 const CHOICES: [&str; 6] = [
     "specular_model = \"kelemen\"",
-    "specular_model = \"ggx\"\nspecular_map = \"f0\"",
+    "specular_model = \"ggx\"\nspecular_map = \"f0\"\nnormal_filter = \"toksvig\"",
     "specular_model = \"ggx\"\nsplit_sum = \"exact\"\nspecular_map = \"f0\"",
     "specular_model = \"ggx\"\nspecular_visibility = \"none\"\nlobe_lookup = \"off_peak\"",
-    "specular_visibility = \"cone\"\nspecular_map = \"f0\"",
+    "specular_visibility = \"cone\"\nspecular_map = \"f0\"\nnormal_filter = \"toksvig\"",
     "specular_visibility = \"cone\"\nlobe_lookup = \"off_peak\"",
 ];
 

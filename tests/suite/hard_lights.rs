@@ -20,13 +20,13 @@ const EFFECTS: &str = "\"diffuse\", \"normal_map\", \"occlusion\", \"rim\", \"li
 
 /// Lines of `[model]` and start values.
 const WAYS: [(&str, &str); 4] = [
-    ("", "gloss = 0.3"),
+    ("normal_filter = \"toksvig\"", "gloss = 0.3"),
     (
         "specular_model = \"ggx\"\nsplit_sum = \"exact\"\nspecular_visibility = \"cone\"\nspecular_map = \"f0\"",
         "roughness = 0.05\nf0 = 0\nf0_floor = 0",
     ),
     (
-        "specular_model = \"ggx\"\nlobe_lookup = \"off_peak\"\nvisibility = \"scalar\"",
+        "specular_model = \"ggx\"\nlobe_lookup = \"off_peak\"\nvisibility = \"scalar\"\nnormal_filter = \"toksvig\"",
         "roughness = 1\nf0 = 0.2\ngloss = 0.9",
     ),
     (

@@ -11,6 +11,8 @@ use crate::exports::{compile_stage, engine_facts, godot_in_glsl};
 
 /// What Unity's `UnityCG.cginc` and its constants give (Unity's manual, "Built-in shader helper functions").
 const UNITY_CG: &str = "
+#define CBUFFER_START(name) cbuffer name {
+#define CBUFFER_END };
 float4x4 unity_ObjectToWorld;
 float4x4 unity_MatrixVP;
 float4 unity_WorldTransformParams;
@@ -77,6 +79,9 @@ fn unitys_material_is_hlsl_around_the_shader() {
             found.unwrap_or_else(|error| panic!("{stage}: {error}\n{code}"));
             let spoilt = replaced(&code, "turned(", "turnt(");
             assert!(compile_stage(stage, entry, &spoilt).is_err(), "{stage}: anything is taken");
+            // The constants are the material's: the include defines none then.
+            let spoilt = replaced(&code, "#define SKINFIT_MATERIAL\n", "");
+            assert!(compile_stage(stage, entry, &spoilt).is_err(), "{stage}: constants twice");
         }
     }
 }

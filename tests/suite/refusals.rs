@@ -94,6 +94,18 @@ fn refusals_of_scene_files_say_where_what_and_what_to_do() {
             "[fit.maps.color]\nlower = 1.5\n[fit]".into(),
             &["lower = 1.5 is not below upper, which is 1 by default"],
         ),
+        (
+            "[fit]",
+            "[fit]\nbounds = { hilite = [0.8, 0.2] }".into(),
+            &["hilite stays within [0.8, 0.2]", "no such interval", "the lesser first"],
+        ),
+        (
+            "[fit]",
+            "[fit]\nbounds = { rim_exponent = [0.1, 4] }".into(),
+            &["rim_exponent stays within [0.1, 4]", "[0.25, 16]"],
+        ),
+        ("[fit]", "[fit]\nbounds = { hilite = [0, nan] }".into(), &["hilite stays within [0, NaN]"]),
+        ("[fit]", "[fit]\nbounds = { shine = [0, 1] }".into(), &["unknown parameter `shine`"]),
         ("[fit]", "[fit]\nloss = \"l1\"".into(), &["unknown loss `l1`", "`l2`"]),
         ("[quality]", "[quality]\nlobe_size = 1".into(), &["lobe_size = 1", "[4, 1024]"]),
         ("[environment]\nfile = \"env.exr\"", String::new(), &["no [environment]"]),

@@ -130,6 +130,7 @@ fn outcome() -> Outcome {
                 unknown,
                 start: unknown.get(&start),
                 value,
+                bounds: unknown.bounds(),
                 std_error,
                 // Independent residuals would say half.
                 noise_error: std_error.map(|error| 0.5 * error),

@@ -125,7 +125,8 @@ impl Baker<'_> {
     }
 }
 
-/// A key with the mesh at rest and with each of `morphs` targets at weight 1, and how many vertices it has.
+/// A key with the mesh at rest and with each of `morphs` targets at weight 1, and how many vertices it has; and with what
+/// its rays are drawn by.
 fn posed_key(mut key: Key, pose: &(dyn Fn(&[f32]) -> PosedMesh + Sync), morphs: usize) -> (Key, usize) {
     let mut vertices = 0;
     for target in 0..=morphs {
@@ -133,6 +134,9 @@ fn posed_key(mut key: Key, pose: &(dyn Fn(&[f32]) -> PosedMesh + Sync), morphs: 
         let posed = pose(&weights);
         key = key.with(&posed.positions).with(&posed.normals).with(posed.occluders().as_flattened());
         vertices = posed.positions.len();
+        if let Some(rest) = posed.rest.as_deref().filter(|_| target == 0) {
+            key = key.with(&rest.positions).with(&rest.normals);
+        }
     }
     (key, vertices)
 }

@@ -10,7 +10,7 @@ use std::sync::LazyLock;
 use crate::{files, output};
 
 /// All that makes bakes of their inputs: another text may make others, so that old files are left alone.
-const SOURCES: [&str; 28] = [
+const SOURCES: [&str; 29] = [
     include_str!("baker.rs"),
     include_str!("between.rs"),
     include_str!("cache.rs"),
@@ -35,6 +35,7 @@ const SOURCES: [&str; 28] = [
     include_str!("stacks.rs"),
     include_str!("thickness.rs"),
     include_str!("transfer.rs"),
+    include_str!("turning.rs"),
     include_str!("vertex_rays.rs"),
     include_str!("wide_bvh.rs"),
     include_str!("../scene/sky_lights.rs"),

@@ -7,7 +7,8 @@
 //! - [`lobes`]: the stack of specular cubes over the exponent; [`reflected`]: over a BRDF's roughness
 //! - [`stacks`]: which cube of which stack is looked up
 //! - [`lobe_sky`]: as rays into a lobe look it up
-//! - [`occlusion`]: per-vertex ambient occlusion (`vertex_rays`: its rays; `low_discrepancy`: their directions)
+//! - [`occlusion`]: per-vertex ambient occlusion (`vertex_rays`: its rays; `low_discrepancy`: their directions;
+//!   `turning`: the frames that these are in)
 //! - [`harmonics`]: spherical harmonics; [`coefficients`]: the environment's light by them
 //! - [`transfer`]: which of that light arrives at each vertex, past the mesh ([`interreflection`]: and by way of it);
 //!   [`shadowed`]: how much; [`sky`]: which of both a scene asks for
@@ -39,11 +40,13 @@ pub mod sky;
 pub mod stacks;
 pub mod thickness;
 pub mod transfer;
+mod turning;
 pub(crate) mod vertex_rays;
 pub(crate) mod wide_bvh;
 
 use std::ops::RangeInclusive;
 use std::path::Path;
+use std::sync::Arc;
 
 use crate::model::cube::Cube;
 use crate::model::params::Param;
@@ -211,6 +214,15 @@ fn all_sets<T: Clone + Default>(scene: &Scene, used: &[usize], baked: Vec<T>) ->
     sets
 }
 
+/// The poses that `pose` gives, which know where the scene's mesh is at rest: rays are drawn by that.
+fn resting(
+    scene: &Scene,
+    pose: &(dyn Fn(&[f32]) -> PosedMesh + Sync),
+) -> impl Fn(&[f32]) -> PosedMesh + Sync {
+    let rest = Arc::new(scene.mesh.rest());
+    move |weights| PosedMesh { rest: Some(Arc::clone(&rest)), ..pose(weights) }
+}
+
 /// Ambient occlusion, with a set for each of the morph targets `used`.
 fn occlusion_of_used(
     scene: &Scene,
@@ -237,6 +249,7 @@ pub fn bake_scene_transfer(
     cache: Option<&Path>,
 ) -> (VertexTransfer, BakeStats) {
     let mut baker = Baker { cache, stats: BakeStats::default() };
+    let pose = &resting(scene, pose);
     (sky::transfer_of_used(scene, pose, &used_morphs(scene), order, bounces, &mut baker), baker.stats)
 }
 
@@ -255,10 +268,14 @@ impl Ranges {
     pub fn of(scene: &Scene, fit: bool) -> Self {
         let free = |name: &str| fit && scene.fit.free.iter().any(|column| column.param.name() == name);
         let [exponent, rough, glossy] = Stack::ALL.map(|stack| stack.place(&scene.params));
-        let lobe = Param::SpecularLobe.info();
-        let exponents = if free(lobe.name) { lobe.lower..=lobe.upper } else { exponent..=exponent };
+        let (lower, upper) = scene.fit.bounds.of(Param::SpecularLobe);
+        let exponents = if free(Param::SpecularLobe.name()) {
+            lower.min(exponent)..=upper.max(exponent)
+        } else {
+            exponent..=exponent
+        };
         let widest = match Param::from_identifier("roughness") {
-            Some(roughness) if free("roughness") => roughness.info().upper,
+            Some(roughness) if free("roughness") => scene.fit.bounds.of(roughness).1.max(rough),
             _ => rough,
         };
         let sharpest = match scene.setup().choices.glossy {
@@ -302,6 +319,7 @@ fn surface(
     light: impl FnOnce(&Scene) -> Option<SkyLight>,
     baker: &mut Baker<'_>,
 ) -> PoseBake {
+    let pose = &resting(scene, pose);
     let sky = sky::Wanted::of(scene).map(|wanted| SkyBake {
         transfer: sky::transfer_of_used(scene, pose, used, wanted.order, wanted.bounces, baker),
         light: wanted.light.then(|| light(scene)).flatten(),

@@ -2,8 +2,10 @@
 //! into the mesh, within a cone about -N, as thickness is.
 //!
 //! Vertices that coincide in every pose and share a normal are one. The directions depend on the rest position alone,
-//! so that the noise of a morph target's difference cancels where the target changes nothing.
+//! so that the noise of a morph target's difference cancels where the target changes nothing, and they turn with the
+//! surface (`turning`), so that of a head that moves as one each frame has the noise of the one before.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 
 use glam::{Mat3A, Vec3, Vec3A, vec3a};
@@ -11,8 +13,9 @@ use rayon::prelude::*;
 
 use super::low_discrepancy::{Sobol, mix};
 use super::rays::RayMesh;
+use super::turning::Turning;
 use super::wide_bvh::WideBvh;
-use crate::scene::mesh::PosedMesh;
+use crate::scene::mesh::{PosedMesh, RestSurface};
 
 /// How far above the surface rays start, as a share of the mesh's diagonal: well above the rounding
 /// of f32 positions (6e-8), well below any crease that a vertex normal resolves.
@@ -31,6 +34,8 @@ pub(super) struct VertexRays {
     slot: Vec<u32>,
     /// A seed for each of `distinct`.
     seeds: Vec<u32>,
+    /// How the frame of each of `distinct` turns from pose to pose.
+    turning: Vec<Turning>,
     offset: f32,
     way: Way,
 }
@@ -73,14 +78,19 @@ impl VertexRays {
         let rest = pose(&weights(None));
         let targets: Vec<PosedMesh> = (0..morphs).map(|i| pose(&weights(Some(i)))).collect();
         let (distinct, slot) = distinct(&rest, &targets);
+        let own = || RestSurface { positions: rest.positions.clone(), normals: rest.normals.clone() };
+        let known = rest.rest.as_deref().filter(|still| still.positions.len() == rest.positions.len());
+        let still = known.map_or_else(|| Cow::Owned(own()), Cow::Borrowed);
         let seed = |&vertex: &u32| {
-            let [x, y, z] = bits(rest.positions[vertex as usize]);
+            let [x, y, z] = bits(still.positions[vertex as usize]);
             mix(x ^ mix(y ^ mix(z)))
         };
         let seeds = distinct.iter().map(seed).collect();
+        let turning = Turning::of(&still, &rest.triangles, &distinct);
         let offset = offset(&rest.positions);
         let sobol = Sobol::new(count.max(1));
-        Self { rest, targets, sobol, distinct, slot, seeds, offset, way: Way::Outward }
+        drop(still);
+        Self { rest, targets, sobol, distinct, slot, seeds, turning, offset, way: Way::Outward }
     }
 
     /// The same of rays into the mesh, within a cone about -N whose half angle has the sine `widest`.
@@ -121,7 +131,7 @@ impl VertexRays {
         if normal == Vec3A::ZERO || !position.is_finite() {
             return Rays { origin, directions: Vec::new() };
         }
-        let frame = frame(axis);
+        let frame = self.turning[i].frame(pose, vertex, axis);
         Rays { origin, directions: self.sobol.cone(self.seeds[i], widest).map(|d| frame * d).collect() }
     }
 
@@ -149,8 +159,10 @@ impl VertexRays {
         let found = |i: usize| {
             let rays = self.rays(i, target);
             let vertex = self.vertex(i);
-            let still = self.rest.positions[vertex] == target.positions[vertex]
-                && self.rest.normals[vertex] == target.normals[vertex];
+            let stays = |vertex: usize| self.rest.positions[vertex] == target.positions[vertex];
+            let still = stays(vertex)
+                && self.rest.normals[vertex] == target.normals[vertex]
+                && self.turning[i].neighbour().is_none_or(stays);
             let found = match still {
                 true => kept(&at_rest[i], moved.as_ref().map(RayMesh::wide), mesh.wide(), &rays),
                 false => F::along(mesh.wide(), &rays),

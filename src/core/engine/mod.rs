@@ -29,6 +29,7 @@ use std::sync::Arc;
 
 pub use self::task::Task;
 use self::view::ObservedView;
+use crate::model::bounds::Bounds;
 use crate::model::gain::Gain;
 use crate::model::params::{Channels, Column, Params};
 
@@ -230,6 +231,18 @@ impl Unknown {
             // A gain of 0 would explain any image by darkness.
             Self::Gain(..) => (1e-3, 1e3),
         }
+    }
+
+    /// The same within what scenes set (one for each, or none); those of the first are the skin's.
+    #[must_use]
+    pub fn bounds_within(&self, scenes: &[Bounds]) -> (f64, f64) {
+        let of = |scene: usize, column: &Column| scenes.get(scene).map(|bounds| bounds.of(column.param));
+        let own = match self {
+            Self::Param(column) => of(0, column),
+            Self::Own(scene, column) => of(*scene, column),
+            Self::Gain(..) => None,
+        };
+        own.unwrap_or_else(|| self.bounds())
     }
 
     /// Whether the model is linear in it once the non-linear unknowns are fixed.

@@ -48,6 +48,8 @@ pub struct Dialect {
     pub filters: [&'static str; 3],
     /// The bits of a vector's floats; empty where the language has none, but `isfinite`.
     pub bits: &'static str,
+    /// What stands before the constants and behind them, where a material may have them in place of the text.
+    pub around_constants: [&'static str; 2],
     /// Lines that come first.
     pub prologue: &'static str,
     /// Lines that come last.
@@ -68,6 +70,7 @@ const BASE: Dialect = Dialect {
     samplers: ["skinfit_map_sampler", "skinfit_cube_sampler"],
     filters: [""; 3],
     bits: "",
+    around_constants: [""; 2],
     prologue: "",
     epilogue: "",
 };
@@ -136,6 +139,7 @@ pub const UNITY: Dialect = Dialect {
     declarations: ["Texture2D<float4> {n};", "TextureCube<float4> {n};", "SamplerState {n};"],
     samplers: ["skinfit_linear_repeat_sampler", "skinfit_linear_clamp_sampler"],
     filters: ["_linear_repeat", "_trilinear_repeat", "_trilinear_repeat_aniso16"],
+    around_constants: ["#ifndef SKINFIT_MATERIAL\n", "#endif\n"],
     prologue: "#ifndef SKINFIT_INCLUDED\n#define SKINFIT_INCLUDED\n",
     epilogue: "\n#endif\n",
     ..HLSL

@@ -39,9 +39,12 @@ pub(super) fn text(
 pub(super) fn code(dialect: &Dialect, plan: &Plan, resources: &[Resource], params: &Params) -> String {
     let mut text = String::new();
     let literals = plan.literals(params);
+    let [before, behind] = if literals.is_empty() { [""; 2] } else { dialect.around_constants };
+    text.push_str(before);
     for (name, kind, value) in &literals {
         let _ = writeln!(text, "{}", dialect.definition(&names::constant(name), kind, value));
     }
+    text.push_str(behind);
     let filter = plan.facts.maps.filter;
     let levels: Vec<String> = plan.all_levels().iter().map(Level::bound).collect();
     let declared = dialect.filtering(&declarations(dialect, resources, &levels), filter);

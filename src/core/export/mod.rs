@@ -9,6 +9,7 @@
 //! - `handed`: textures as arguments, for a language that has no global ones
 //! - `idle`: terms without a weight, which no shader need compute
 //! - [`cubes`]: baked cubes as KTX2 and DDS; [`vertices`]: what is baked of a mesh, as its attributes
+//! - [`unity`]: a folder for Unity's `Assets`, with a material and what it names
 //! - `constants`, `function`, `material`: the texts; `passes`: how an engine makes what the function looks up of the UV atlas
 //!
 //! The shader is written once, as the planner's rules; every exported function is a translation of them.
@@ -27,7 +28,7 @@ pub mod target;
 mod translate;
 pub mod vertices;
 
-pub use material::material;
+pub use material::{material, unity};
 pub use provenance::Provenance;
 pub use target::Target;
 

@@ -2,6 +2,7 @@
 //! table says that its ratio is what matters.
 
 use crate::engine::{Point, Unknown};
+use crate::model::bounds::Bounds;
 use crate::model::params::Scale;
 
 /// The map between points and vectors of solver coordinates.
@@ -10,22 +11,38 @@ pub struct Coordinates {
     unknowns: Vec<Unknown>,
     origin: Point,
     at_origin: Vec<f64>,
+    /// Least and greatest value of each.
+    bounds: Vec<(f64, f64)>,
     lower: Vec<f64>,
     upper: Vec<f64>,
 }
 
 impl Coordinates {
-    /// The coordinates of `unknowns`; everything else stays as it is at `origin`.
+    /// The coordinates of `unknowns`, within the table's bounds; everything else stays as it is at `origin`.
     #[must_use]
     pub fn new(unknowns: &[Unknown], origin: &Point) -> Self {
-        let each = |value: fn(&Unknown) -> f64| unknowns.iter().map(|u| inward(u, value(u))).collect();
+        Self::within(unknowns, origin, &[])
+    }
+
+    /// The same within what scenes set ([`Unknown::bounds_within`]).
+    #[must_use]
+    pub fn within(unknowns: &[Unknown], origin: &Point, scenes: &[Bounds]) -> Self {
+        let bounds: Vec<(f64, f64)> = unknowns.iter().map(|u| u.bounds_within(scenes)).collect();
+        let bounded = || unknowns.iter().zip(&bounds);
         Self {
             unknowns: unknowns.to_vec(),
             origin: origin.clone(),
             at_origin: unknowns.iter().map(|u| inward(u, u.get(origin))).collect(),
-            lower: each(|u| u.bounds().0),
-            upper: each(|u| u.bounds().1),
+            lower: bounded().map(|(u, (lower, _))| inward(u, *lower)).collect(),
+            upper: bounded().map(|(u, (_, upper))| inward(u, *upper)).collect(),
+            bounds,
         }
+    }
+
+    /// Least and greatest value of each unknown.
+    #[must_use]
+    pub fn bounds(&self) -> &[(f64, f64)] {
+        &self.bounds
     }
 
     /// The unknowns, in order.
@@ -57,7 +74,7 @@ impl Coordinates {
     pub fn point(&self, at: &[f64]) -> Point {
         let mut point = self.origin.clone();
         for (i, unknown) in self.unknowns.iter().enumerate() {
-            let (low, high) = unknown.bounds();
+            let (low, high) = self.bounds[i];
             if at[i] <= self.lower[i] {
                 unknown.set(&mut point, low);
             } else if at[i] >= self.upper[i] {

@@ -86,8 +86,8 @@ pub fn fit_watched(
     watch: &mut dyn FnMut(&Iteration, &Point),
 ) -> Result<Outcome, FitError> {
     let clock = Instant::now();
-    check_bounds(objective, start)?;
-    let coordinates = Coordinates::new(objective.unknowns(), start);
+    let coordinates = Coordinates::within(objective.unknowns(), start, &options.bounds);
+    check_bounds(&coordinates, start)?;
     let saved = match &options.resume {
         Some(path) => Saved::read(path, objective.unknowns(), start, options)?,
         None => begin(objective, start, options, &coordinates)?,
@@ -115,9 +115,8 @@ pub fn fit_watched(
     Ok(conclude(objective, &coordinates, start, options, &saved))
 }
 
-fn check_bounds(objective: &dyn Objective, start: &Point) -> Result<(), FitError> {
-    for unknown in objective.unknowns() {
-        let (lower, upper) = unknown.bounds();
+fn check_bounds(coordinates: &Coordinates, start: &Point) -> Result<(), FitError> {
+    for (unknown, &(lower, upper)) in coordinates.unknowns().iter().zip(coordinates.bounds()) {
         let value = unknown.get(start);
         if !(lower..=upper).contains(&value) || !value.is_finite() {
             return Err(FitError::OutOfBounds { name: unknown.name(), value, lower, upper });
@@ -196,6 +195,7 @@ fn conclude(
         unknown: *unknown,
         start: unknown.get(start),
         value: unknown.get(&end),
+        bounds: coordinates.bounds()[i],
         std_error: known.std_errors[i],
         noise_error: known.noise_errors[i],
         identifiable: known.identifiable[i],

@@ -7,6 +7,7 @@ use std::sync::atomic::AtomicBool;
 use serde::{Deserialize, Serialize};
 
 use super::fingerprint::Fingerprint;
+use crate::model::bounds::Bounds;
 
 /// The solvers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
@@ -105,6 +106,8 @@ pub struct FitOptions {
     pub starts: u32,
     /// What the other starts are drawn from.
     pub seed: u64,
+    /// What scenes bound their free parameters by: one for each, or none.
+    pub bounds: Vec<Bounds>,
     /// What identifies the objective: states of others are refused.
     pub fingerprint: Fingerprint,
     /// Where the state is kept, written about once a second and at the end.
@@ -128,6 +131,7 @@ impl Default for FitOptions {
             tolerances: Tolerances::default(),
             starts: 1,
             seed: 0,
+            bounds: Vec::new(),
             fingerprint: Fingerprint::default(),
             state: None,
             resume: None,

@@ -108,6 +108,8 @@ pub struct UnknownOutcome {
     pub start: f64,
     /// Its value at the end.
     pub value: f64,
+    /// Least and greatest value that it might have had.
+    pub bounds: (f64, f64),
     /// One standard error; `None` at a bound or when unidentifiable.
     pub std_error: Option<f64>,
     /// What it were if residuals were independent.

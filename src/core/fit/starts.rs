@@ -23,14 +23,16 @@ pub fn draw(coordinates: &Coordinates, seed: u64, index: u32) -> Vec<f64> {
     key[..8].copy_from_slice(&seed.to_le_bytes());
     key[8..12].copy_from_slice(&index.to_le_bytes());
     let mut rng = StdRng::from_seed(key);
-    let one = |(unknown, &given): (&Unknown, &f64)| draw_one(unknown, given, &mut rng);
-    let drawn: Vec<f64> = coordinates.unknowns().iter().zip(given).map(one).collect();
+    let one = |((unknown, &bounds), &given): ((&Unknown, &(f64, f64)), &f64)| {
+        draw_one(unknown, bounds, given, &mut rng)
+    };
+    let unknowns = coordinates.unknowns().iter().zip(coordinates.bounds());
+    let drawn: Vec<f64> = unknowns.zip(given).map(one).collect();
     let bounds = coordinates.lower().iter().zip(coordinates.upper());
     drawn.iter().zip(bounds).map(|(u, (lower, upper))| u.clamp(*lower, *upper)).collect()
 }
 
-fn draw_one(unknown: &Unknown, given: f64, rng: &mut StdRng) -> f64 {
-    let (lower, upper) = unknown.bounds();
+fn draw_one(unknown: &Unknown, (lower, upper): (f64, f64), given: f64, rng: &mut StdRng) -> f64 {
     if is_log(unknown) {
         rng.random_range(lower.ln()..upper.ln())
     } else if lower > 0.0 && upper / lower <= WIDEST_RATIO {

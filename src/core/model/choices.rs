@@ -17,6 +17,8 @@ pub struct Choices {
     pub lobe_lookup: LobeLookup,
     /// What the specular map scales.
     pub specular_map: SpecularMap,
+    /// What becomes of bumps that are smaller than what a sample covers.
+    pub normal_filter: NormalFilter,
     /// How the sky that a point sees is found.
     pub visibility: Visibility,
     /// How light counts that the skin throws back.
@@ -164,6 +166,31 @@ impl SpecularMap {
     }
 }
 
+/// What becomes of bumps that are smaller than what a sample covers (the scene's `normal_filter`).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum NormalFilter {
+    /// The specular lobe is as wide as that of one bump: of many only their mean normal is seen.
+    #[default]
+    None,
+    /// It is widened by how far their normals are apart, which how short their mean is tells (Toksvig, *Mipmapping
+    /// normal maps*, 2005).
+    Toksvig,
+}
+
+impl NormalFilter {
+    /// Both choices, in the order of documentation.
+    pub const ALL: [Self; 2] = [Self::None, Self::Toksvig];
+
+    /// The name in scene files.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Toksvig => "toksvig",
+        }
+    }
+}
+
 /// How the sky that a point sees is found (the scene's `visibility`).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Visibility {
@@ -274,7 +301,7 @@ impl SkinReflection {
 impl Choices {
     /// Those that a scene file names, each by its key.
     #[must_use]
-    pub const fn named(&self) -> [(&'static str, &'static str); 17] {
+    pub const fn named(&self) -> [(&'static str, &'static str); 18] {
         let [method, taps, ambient_normal, stretch, seams, lookup, unblurred, combined] =
             self.diffusion.named();
         let [through] = self.transmission.named();
@@ -284,6 +311,7 @@ impl Choices {
             ("specular_visibility", self.specular_visibility.name()),
             ("lobe_lookup", self.lobe_lookup.name()),
             ("specular_map", self.specular_map.name()),
+            ("normal_filter", self.normal_filter.name()),
             ("visibility", self.visibility.name()),
             ("bounces", self.bounces.name()),
             ("skin_reflection", self.skin_reflection.name()),
@@ -314,6 +342,7 @@ impl Choices {
             "lobe_visibility" => visibility(SpecularVisibility::Lobe) || visibility(SpecularVisibility::Rays),
             "off_peak" => self.lobe_lookup == LobeLookup::OffPeak,
             "f0_map" => self.specular_map == SpecularMap::F0,
+            "toksvig" => self.normal_filter == NormalFilter::Toksvig,
             "polynomial_bounces" => self.bounces == Bounces::Polynomial,
             "gathered_bounces" => self.bounces == Bounces::Gathered,
             "glossy" => self.glossy,
@@ -322,7 +351,7 @@ impl Choices {
     }
 
     /// The conditions that [`Self::holds`] knows.
-    pub const CONDITIONS: [&'static str; 17] = [
+    pub const CONDITIONS: [&'static str; 18] = [
         "kelemen",
         "ggx",
         "exact_split_sum",
@@ -332,6 +361,7 @@ impl Choices {
         "lobe_visibility",
         "off_peak",
         "f0_map",
+        "toksvig",
         "polynomial_bounces",
         "gathered_bounces",
         "glossy",

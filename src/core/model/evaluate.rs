@@ -1,8 +1,8 @@
 //! What is evaluated.
 
 use super::choices::{
-    Bounces, Choices, LobeLookup, SkinReflection, SpecularMap, SpecularModel, SpecularVisibility, SplitSum,
-    Visibility,
+    Bounces, Choices, LobeLookup, NormalFilter, SkinReflection, SpecularMap, SpecularModel,
+    SpecularVisibility, SplitSum, Visibility,
 };
 use super::dapple::Dapple;
 use super::diffusion::DiffusionChoices;
@@ -47,6 +47,7 @@ impl Setup {
                 specular_visibility: SpecularVisibility::Lagarde,
                 lobe_lookup: LobeLookup::Mirror,
                 specular_map: SpecularMap::Weight,
+                normal_filter: NormalFilter::None,
                 visibility: Visibility::Sh4,
                 bounces: Bounces::Gathered,
                 skin_reflection: SkinReflection::Gathered,

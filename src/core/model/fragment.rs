@@ -73,6 +73,19 @@ pub fn decode_normal<R: Real>(form: Form, texel: V3<R>, t: V3<R>, b: V3<R>, n: V
     (scale(z, n), scale_add(x, t, scale(y, b)))
 }
 
+/// The variance of the slopes below a sample, along each axis, from a texel that is the mean of encoded unit normals: their
+/// mean is as long as 1 / (1 + that) (Toksvig 2005). 0 where the texel is not finite or nothing.
+#[must_use]
+pub fn normal_spread(texel: [f32; 3]) -> f32 {
+    let [x, y, z] = texel.map(|t| 2.0 * t - 1.0);
+    let squared = x * x + y * y + z * z;
+    if !squared.is_finite() || squared == 0.0 {
+        return 0.0;
+    }
+    let size = squared.sqrt().clamp(0.1, 1.0);
+    (1.0 - size) / size
+}
+
 /// Base and bump as a sample holds them: where no base is left (below 1e-37 it is noise) the side that faces
 /// the eye counts, and a bump that is not finite counts nothing (MODEL 7).
 #[inline(always)]

@@ -1,7 +1,8 @@
 //! What the rules of the skin model are about: parameters, effects, terms, the numbers of a fragment and of a vertex, and
 //! the kinds of numbers that they are computed in. The formulas themselves are the rules' (`shader/rules`).
 //!
-//! - [`params`]: the one table of parameters; `columns`: which of their channels are free together
+//! - [`params`]: the one table of parameters; `columns`: which of their channels are free together;
+//!   [`bounds`]: what a scene bounds them by
 //! - [`readings`]: how the paper is read; [`effects`]: what can be switched on; [`needs`]: what each effect asks for;
 //!   [`terms`]: parts of the sum
 //! - [`choices`]: which way is taken where there are several; [`diffusion`], [`transmission`]: those of light that scatters
@@ -18,6 +19,7 @@
 
 pub mod batch;
 pub mod bearing;
+pub mod bounds;
 pub mod choices;
 mod columns;
 pub mod cube;

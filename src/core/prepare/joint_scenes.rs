@@ -7,6 +7,7 @@ use super::{Baked, HeldOut, PrepareError, StageSeconds};
 use crate::engine::joint::{Joint, label};
 use crate::engine::view::ObservedView;
 use crate::engine::{Engine, Point, Task};
+use crate::model::bounds::Bounds;
 use crate::model::params::{Param, Params};
 
 /// A scene that is ready to be fitted with others.
@@ -102,6 +103,12 @@ impl JointScenes {
     #[must_use]
     pub fn task(&self, part: &JointScene) -> Option<Task> {
         Some(part.baked.task_over(Arc::clone(self.engine(part)?.views())))
+    }
+
+    /// What each fitted scene bounds its free parameters by.
+    #[must_use]
+    pub fn bounds(&self) -> Vec<Bounds> {
+        self.fitted().map(|part| part.baked.scene.fit.bounds.clone()).collect()
     }
 
     /// Pixels in a row of each fitted view's image.

@@ -58,6 +58,8 @@ fn agree(first: &Scene, other: &Scene) -> Result<(), Difference> {
     same("list of the skin's effects", effects(first), effects(other), "Switch the same on in both scenes")?;
     let free = "Leave the same free in both scenes";
     same("list of what is free of the skin", list(first), list(other), free)?;
+    let within = "Give them the same in both scenes";
+    same("bounds of what is the skin's", bounds(first), bounds(other), within)?;
     for param in Param::of(first.effects).filter(|param| is_held(first, *param)) {
         let [one, two] = [first, other].map(|scene| scene.params.rgb(param));
         if one != two {
@@ -93,6 +95,13 @@ fn list(scene: &Scene) -> String {
     }
     names.sort_unstable();
     names.join(", ")
+}
+
+/// What parameters of the skin stay within.
+fn bounds(scene: &Scene) -> String {
+    let own = scene.fit.bounds.iter().filter(|(param, _)| !param.is_of_scene());
+    let all: Vec<String> = own.map(|(param, [a, b])| format!("{} in [{a}, {b}]", param.name())).collect();
+    all.join(", ")
 }
 
 fn value(rgb: [f64; 3]) -> String {

@@ -11,6 +11,7 @@ use super::rows::Row;
 use super::skin::Skin;
 use super::sky::Sky;
 use super::supply::{Points, Supplies, put_each};
+use super::surface::NORMAL_SPREAD;
 use super::trace::Hit;
 use super::{SampleError, bounced, lit, posed_occlusion, sky, through};
 use crate::bake::interreflection::VertexGather;
@@ -163,10 +164,10 @@ impl<'a> PosedSurface<'a> {
         Self { charts, ..self }
     }
 
-    /// Whether a field is found at vertices: what rays into the lobes of samples find is not.
+    /// Whether a field is found at vertices: what rays into the lobes of samples find is not, nor what is below a sample.
     #[must_use]
     pub fn finds_at_vertices(&self, field: Field) -> bool {
-        self.lobes.as_ref().is_none_or(|lobes| !lobes.finds(field))
+        field.name() != NORMAL_SPREAD && self.lobes.as_ref().is_none_or(|lobes| !lobes.finds(field))
     }
 
     /// What there is of a field at each vertex, its numbers one after the other; a vertex that is of no triangle has what

@@ -12,13 +12,16 @@ use super::trace::Hit;
 use crate::model::effects::{Form, Silhouette};
 use crate::model::evaluate::Setup;
 use crate::model::fields::Field;
-use crate::model::fragment::{Fragment, decode_normal, guarded, unit_view};
+use crate::model::fragment::{Fragment, decode_normal, guarded, normal_spread, unit_view};
 use crate::model::params::Param;
 use crate::model::vector::normalize_or;
 use crate::scene::Scene;
 use crate::scene::maps::{Map, Maps};
 use crate::scene::mesh::PosedMesh;
 use crate::scene::view::Camera;
+
+/// The field of how far normals below a sample are apart.
+pub(super) const NORMAL_SPREAD: &str = "normal_spread";
 
 /// Whether the shading normal has a part along T and B. Of a missing map, the listing still reads its neutral
 /// value, which it does not decode.
@@ -171,6 +174,9 @@ impl<'a> Surface<'a> {
                 }
             });
         }
+        if field.name() == NORMAL_SPREAD {
+            return put_each(points, rows, |hit, numbers| numbers.fill(self.normal_spread(hit)));
+        }
         match self.posed.lobes.as_ref().filter(|lobes| lobes.finds(field)) {
             Some(lobes) => put_each(points, rows, |hit, numbers| {
                 lobes.find(field, (hit.triangle, hit.weights()), &self.at(hit).0, numbers);
@@ -206,6 +212,15 @@ impl<'a> Surface<'a> {
         let [t, b, n] = [t, b, n].map(|v| v.to_array());
         let (base, bump) = decode_normal(self.form, texel, t, b, n);
         (base.into(), bump.into())
+    }
+
+    /// How far the normal map's directions below a sample are apart; 0 where it is not read.
+    fn normal_spread(&self, hit: Hit) -> f32 {
+        if self.bitangents.is_empty() || self.maps.normal.is_none() {
+            return 0.0;
+        }
+        let at = (hit.uv(self.mesh), self.footprints.as_ref().map(|footprints| footprints.at(hit)));
+        normal_spread(self.map(|maps| maps.normal.as_ref(), [0.5, 0.5, 1.0], at))
     }
 
     /// The unit vector from the eye to the point.

@@ -108,6 +108,7 @@ pub(super) struct ModelTable {
     pub specular_visibility: Option<Spanned<String>>,
     pub lobe_lookup: Option<Spanned<String>>,
     pub specular_map: Option<Spanned<String>>,
+    pub normal_filter: Option<Spanned<String>>,
     pub visibility: Option<Spanned<String>>,
     pub bounces: Option<Spanned<String>>,
     pub skin_reflection: Option<Spanned<String>>,
@@ -136,6 +137,9 @@ pub(super) struct FamilyTable {
 
 /// `[model.params]`
 pub(super) type ParamsTable = BTreeMap<Spanned<String>, Spanned<ParamValue>>;
+
+/// `[fit.bounds]`
+pub(super) type BoundsTable = BTreeMap<Spanned<String>, Spanned<[f64; 2]>>;
 
 /// `[[view]]`
 #[derive(Clone, Debug, serde::Deserialize)]
@@ -238,6 +242,8 @@ pub(super) struct FitTable {
     pub free: Option<Vec<Spanned<String>>>,
     #[serde(default)]
     pub per_channel: Vec<Spanned<String>>,
+    #[serde(default)]
+    pub bounds: BoundsTable,
     pub loss: Option<Spanned<String>>,
     #[serde(default)]
     pub gains: bool,

@@ -188,6 +188,7 @@ fn read(source: &Source, table: &MapPriorTable, default: MapPrior) -> Result<Map
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::bounds::Bounds;
     use crate::model::params::Column;
     use crate::scene::Loss;
 
@@ -199,6 +200,7 @@ mod tests {
         let fit = FitSettings {
             free: free.clone(),
             loss: Loss::default(),
+            bounds: Bounds::default(),
             free_gains: false,
             white_balance: false,
             cameras: false,

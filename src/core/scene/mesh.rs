@@ -37,6 +37,14 @@ pub struct Mesh {
     pub plain: Option<Arc<PlainParts>>,
 }
 
+impl Mesh {
+    /// Its vertices before they are moved.
+    #[must_use]
+    pub fn rest(&self) -> RestSurface {
+        RestSurface { positions: self.positions.clone(), normals: self.normals.clone() }
+    }
+}
+
 /// One morph target: what is added at weight 1.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Morph {
@@ -69,6 +77,17 @@ pub struct PosedMesh {
     pub fields: Vec<VertexField>,
     /// What of it is not skin; none where all of it is.
     pub plain: Option<Arc<PlainParts>>,
+    /// Where its vertices stand at rest, for whoever draws noise by that; none where this is all that is known of it.
+    pub rest: Option<Arc<RestSurface>>,
+}
+
+/// The vertices of a mesh before bones, morph targets and animation move them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RestSurface {
+    /// Positions.
+    pub positions: Vec<Vec3>,
+    /// Unit normals.
+    pub normals: Vec<Vec3>,
 }
 
 impl PosedMesh {

@@ -73,12 +73,14 @@ pub use load::check_values;
 pub use map_fit::{MapKind, MapPrior, MapSettings, MapSolver};
 pub use numbers::{digits, interval, short};
 pub use offers::Offers;
+pub use settings::check_bounds;
 pub use shadow_maps::ShadowMaps;
 pub use terms::register_terms;
 
 use std::path::PathBuf;
 
 use self::diffusion::Diffusion;
+use crate::model::bounds::Bounds;
 use crate::model::choices::Choices;
 use crate::model::dapple::Dapple;
 use crate::model::effects::{Effects, Form, Lookups, Silhouette};
@@ -206,6 +208,8 @@ pub struct FitSettings {
     /// The unknowns: one tied column a parameter, or three when its start value has three channels
     /// or the scene's `per_channel` list names it.
     pub free: Vec<Column>,
+    /// What they stay within, where that is less than the table's.
+    pub bounds: Bounds,
     /// What is minimised.
     pub loss: Loss,
     /// Whether each view has a gain of its own (the first view's is held at 1).

@@ -3,13 +3,16 @@
 use toml::Spanned;
 
 use super::error::{SceneError, Warnings, warn};
-use super::file::{BloomTable, EnvironmentTable, FitTable, ModelTable, ParamsTable, QualityTable, Source};
+use super::file::{
+    BloomTable, BoundsTable, EnvironmentTable, FitTable, ModelTable, ParamsTable, QualityTable, Source,
+};
 use super::maps::Spots;
 use super::numbers::{interval, number, short, whole};
 use super::{Bloom, FitSettings, Loss, Quality, map_fit};
+use crate::model::bounds::Bounds;
 use crate::model::choices::{
-    Bounces, Choices, LobeLookup, SkinReflection, SpecularMap, SpecularModel, SpecularVisibility, SplitSum,
-    Visibility,
+    Bounces, Choices, LobeLookup, NormalFilter, SkinReflection, SpecularMap, SpecularModel,
+    SpecularVisibility, SplitSum, Visibility,
 };
 use crate::model::diffusion::DiffusionChoices;
 use crate::model::effects::{Effect, Effects, Form, Lookups, Silhouette};
@@ -67,6 +70,12 @@ pub(super) fn choices(source: &Source, model: &ModelTable) -> Result<Choices, Sc
             "specular_map",
             model.specular_map.as_ref(),
             SpecularMap::ALL.map(|c| (c.name(), c)),
+        )?,
+        normal_filter: choice(
+            source,
+            "normal_filter",
+            model.normal_filter.as_ref(),
+            NormalFilter::ALL.map(|c| (c.name(), c)),
         )?,
         visibility: choice(
             source,
@@ -208,12 +217,56 @@ pub(super) fn fit(
     let maps = map_fit::settings(source, &table.maps)?;
     Ok(FitSettings {
         free: columns.collect(),
+        bounds: bounds(source, &table.bounds)?,
         loss,
         free_gains: table.gains,
         white_balance: table.white_balance,
         cameras: table.cameras,
         maps,
     })
+}
+
+/// `[fit.bounds]`: what parameters stay within, no more than the table lets them.
+fn bounds(source: &Source, table: &BoundsTable) -> Result<Bounds, SceneError> {
+    let mut all = Bounds::default();
+    for (name, value) in table {
+        let param = param(source, name)?;
+        let &[lower, upper] = value.get_ref();
+        check_bounds(param, [lower, upper]).map_err(|(what, remedy)| source.error(value, what, &remedy))?;
+        all.set(param, [lower, upper]);
+    }
+    Ok(all)
+}
+
+/// Whether a fit may keep a parameter within these.
+///
+/// # Errors
+/// What is wrong, and what to do.
+pub fn check_bounds(param: Param, [lower, upper]: [f64; 2]) -> Result<(), (String, String)> {
+    let info = param.info();
+    if info.held {
+        let what = format!("{} is the scene's: no fit moves it", info.name);
+        return Err((what, "Take it out; bound the light's `color` in its place".to_owned()));
+    }
+    if !(lower < upper
+        && lower >= info.lower
+        && upper <= info.upper
+        && lower.is_finite()
+        && upper.is_finite())
+    {
+        let what = format!(
+            "{} stays within [{}, {}]: there is no such interval",
+            info.name,
+            short(lower),
+            short(upper)
+        );
+        let (lower, upper) = info.range();
+        return Err((
+            what,
+            format!("Give two finite numbers in {}, the lesser first", interval(lower, upper)),
+        ));
+    }
+    Ok(())
 }
 
 /// The free parameters: the names in `free`, or the default ones that an enabled effect asks for.

@@ -3,8 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use super::set::SetArguments;
-use super::{Exit, Refusal, tell_warnings, write_or_say};
+use super::{Exit, Refusal, say, tell_warnings, write_or_say};
+use crate::export::unity::{UnityFolder, UnitySkin};
 use crate::export::{self, Constants, Provenance, Target};
+use crate::files;
 use crate::fit::params_file::{Foreign, ParamsFile};
 use crate::model::params::Param;
 use crate::scene::load::LoadOptions;
@@ -14,7 +16,7 @@ use crate::shader::Facts;
 /// Write tuned constants, alone or with their shader, for another engine
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  skinfit export runs/a/params.toml --to glsl -o skin.glsl\n  skinfit export runs/a/params.toml --to c -o skin.h\n  skinfit export runs/a/params.toml --to unity --set reflection=0 -o Skin.hlsl\n  skinfit export runs/a/params.toml --to godot --material skin.gdshaderinc -o skin.tres\n  skinfit export runs/a/params.toml --to unreal --material Skin -o Skin.txt\n\nTargets: wgsl, glsl, hlsl, cg, msl, godot, unity and unreal hold the shader, and of light that scatters the passes before it, with how to wire them in the head; c, json and toml constants alone, for which the parameters' file is enough. What toml holds is a file of parameters again."
+    after_help = "Examples:\n  skinfit export runs/a/params.toml --to glsl -o skin.glsl\n  skinfit export runs/a/params.toml --to c -o skin.h\n  skinfit export runs/a/params.toml --to unity --set reflection=0 -o Skin.hlsl\n  skinfit export runs/a/params.toml --to godot --material skin.gdshaderinc -o skin.tres\n  skinfit export runs/a/params.toml --to unity --material Skin.hlsl -o baked/Skin.mat\n  skinfit export runs/a/params.toml --to unreal --material Skin -o Skin.txt\n\nTargets: wgsl, glsl, hlsl, cg, msl, godot, unity and unreal hold the shader, and of light that scatters the passes before it, with how to wire them in the head; c, json and toml constants alone, for which the parameters' file is enough. What toml holds is a file of parameters again."
 )]
 pub(super) struct Arguments {
     /// The parameters: params.toml of a run folder.
@@ -28,8 +30,10 @@ pub(super) struct Arguments {
     /// The scene that the parameters belong to [default: scene.toml beside them; constants alone need none].
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
-    /// For godot and unity: in place of the shader a material that includes it by this name. For unreal: nodes to paste into a
-    /// material, with the shader within and this title, or included by a path of a shader directory (/Project/Skin.ush).
+    /// For godot and unity: in place of the shader a material that includes it by this name. Unity's is a ShaderLab file, and
+    /// with an output that ends in .mat a folder for Assets: the material, its shader and what that includes, the scene's maps
+    /// as PNG, and a .meta for each of them and for the baked cubes beside them. For unreal: nodes to paste into a material,
+    /// with the shader within and this title, or included by a path of a shader directory (/Project/Skin.ush).
     #[arg(long, value_name = "SHADER", conflicts_with = "constants")]
     material: Option<String>,
     #[command(flatten)]
@@ -41,6 +45,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     arguments.set.values()?;
+    let folder = unity_folder(arguments)?;
     // Some targets hold nothing else.
     let alone = arguments.material.is_none() && (arguments.constants || arguments.to.dialect().is_none());
     let beside = |name: &str| arguments.params.parent().unwrap_or(Path::new("")).join(name);
@@ -51,10 +56,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         let _ = register_terms(&path);
     }
     let mut file = ParamsFile::read_alone(&arguments.params)?;
-    let scene = match (alone && arguments.scene.is_none(), file.effects) {
-        (true, Some(_)) => None,
+    let (scene, read) = match (alone && arguments.scene.is_none(), file.effects) {
+        (true, Some(_)) => (None, Vec::new()),
         _ if !there => return Err(no_scene(arguments, alone)),
-        _ => Some(loaded(arguments, &path, &mut file)?),
+        _ => {
+            let (scene, read) = files::recorded(|| loaded(arguments, &path, &mut file));
+            (Some(scene?), read)
+        }
     };
     arguments.set.apply(&mut file.params);
     let effects = scene.as_ref().map(|scene| scene.effects).or(file.effects).unwrap_or_default();
@@ -63,6 +71,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         tell_foreign(arguments, &path, scene, &file);
     }
     let from = provenance(arguments, there.then_some(&path), &file, &beside("report.json"));
+    if let (Some(scene), Some((output, include))) = (&scene, folder) {
+        let (facts, params, maps) = (&facts(scene, &file), &file.params, &scene.maps);
+        let made = UnityFolder::new(output, include, UnitySkin { facts, params, from: &from, maps })?;
+        return write_folder(&made, output, &read);
+    }
     let text = match (&scene, &arguments.material) {
         (Some(scene), Some(shader)) => {
             export::material(arguments.to, &facts(scene, &file), &file.params, shader)?
@@ -82,6 +95,36 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         }
     };
     write_or_say(arguments.output.as_deref(), &text)?;
+    Ok(Exit::Done)
+}
+
+/// Unity's material and the shader that it includes, where a folder with all of them is to be written.
+fn unity_folder(arguments: &Arguments) -> Result<Option<(&Path, &str)>, Refusal> {
+    let Some(output) = arguments.output.as_deref() else { return Ok(None) };
+    let saved = output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("mat"));
+    match (arguments.to == Target::Unity && saved, arguments.material.as_deref()) {
+        (false, _) => Ok(None),
+        (true, Some(include)) => Ok(Some((output, include))),
+        (true, None) => Err(Refusal::new(format!(
+            "{}: no material holds a shader's text. Name the shader that it is to include, such as --material Skin.hlsl.",
+            output.display()
+        ))),
+    }
+}
+
+/// Write a material's folder, but over nothing that the scene was read from.
+fn write_folder(made: &UnityFolder, material: &Path, read: &[PathBuf]) -> Result<Exit, Refusal> {
+    if let Some(path) = made.files().find(|path| read.contains(&files::plain(path))) {
+        return Err(Refusal::new(format!(
+            "{}: the scene was read from this file, which the material's would replace. Give the material another name or folder.",
+            path.display()
+        )));
+    }
+    tell_warnings(made.warnings());
+    made.write()?;
+    let names = made.files().filter(|path| *path != material).filter_map(|path| path.file_name());
+    let names: Vec<_> = names.map(|name| name.to_string_lossy()).collect();
+    say(&format!("wrote {}, and beside it {}", material.display(), names.join(", ")))?;
     Ok(Exit::Done)
 }
 

@@ -59,6 +59,9 @@ pub(super) fn fingerprint(scene: &Scene, held: &HeldOut) -> Fingerprint {
         };
         all.with(format!("map {}", field.name()), texels)
     });
+    let within = scene.fit.bounds.iter().map(|(param, [a, b])| format!("{} in [{a}, {b}]", param.name()));
+    let within = within.collect::<Vec<_>>().join(", ");
+    let all = if within.is_empty() { all } else { all.with("bounds", within) };
     let held: Vec<&str> = held.views.iter().map(|view| view.name.as_str()).collect();
     let all = if held.is_empty() { all } else { all.with("list of held-out views", held.join(" ")) };
     scene.views.iter().fold(all, |all, view| {

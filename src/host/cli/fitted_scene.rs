@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use toml_edit::{Array, DocumentMut, Item, Table, TableLike, TomlError, Value};
 
 use super::fitted_cameras::set_cameras;
+use crate::model::bounds::Bounds;
 use crate::model::effects::Form;
 use crate::model::params::{Channels, Column, Param, Params};
 use crate::prepare::MovedCamera;
@@ -21,6 +22,8 @@ pub(super) struct Changes<'a> {
     pub(super) loss: Option<&'a str>,
     /// What is free, instead of the file's.
     pub(super) free: Option<&'a [Column]>,
+    /// What it stays within, instead of the file's.
+    pub(super) bounds: Option<&'a Bounds>,
     /// Whether gains are free, instead of what the file says.
     pub(super) free_gains: Option<bool>,
     /// Whether each channel of them is.
@@ -72,6 +75,11 @@ pub(super) fn as_fitted(text: &str, folder: &Path, changes: Changes<'_>) -> Resu
         && let Some(fit) = section(scene.as_table_mut(), "fit")
     {
         set_free(fit, free);
+    }
+    if let Some(bounds) = changes.bounds
+        && let Some(fit) = section(scene.as_table_mut(), "fit")
+    {
+        set_bounds(fit, bounds);
     }
     for (key, free) in [("gains", changes.free_gains), ("white_balance", changes.white_balance)] {
         if let Some(free) = free
@@ -199,6 +207,21 @@ fn set_free(table: &mut dyn TableLike, free: &[Column]) {
     set(table, "free", Value::Array(Array::from_iter(names)));
     if !coloured.is_empty() || table.contains_key("per_channel") {
         set(table, "per_channel", Value::Array(Array::from_iter(coloured)));
+    }
+}
+
+/// What parameters stay within; those that the file has already keep their place.
+fn set_bounds(fit: &mut dyn TableLike, bounds: &Bounds) {
+    const KEY: &str = "bounds";
+    if bounds.is_empty() {
+        fit.remove(KEY);
+    } else if let Some(table) = section(fit, KEY) {
+        let known: Vec<String> = table.iter().map(|(name, _)| name.to_owned()).collect();
+        let set_now = |name: &String| bounds.iter().any(|(param, _)| param.name() == name.as_str());
+        known.iter().filter(|name| !set_now(name)).for_each(|name| drop(table.remove(name)));
+        for (param, interval) in bounds.iter() {
+            set(table, param.name(), Value::Array(Array::from_iter(interval)));
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Ctrl-C once a fit is under way: the first asks it to stop and to leave what it has, the second ends the program.
 
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::unfinished;
 
@@ -13,6 +13,11 @@ impl Interrupt {
     /// One that something else may set, too.
     pub(super) fn of(flag: &Arc<AtomicBool>) -> Self {
         Self(Arc::clone(flag))
+    }
+
+    /// Whether it was set.
+    pub(super) fn is_set(&self) -> bool {
+        self.0.load(Ordering::SeqCst)
     }
 
     /// Watch for Ctrl-C from now on: the flag that it sets.

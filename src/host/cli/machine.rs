@@ -1,11 +1,14 @@
 //! Who ran the program when, and on what: the command line, the date, the processor.
 
 use std::ffi::OsString;
+use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
+
+use crate::contained::is_contained;
 
 /// What a report tells of its making, as (name, text).
 pub(super) fn made() -> Vec<(String, String)> {
-    let made = [("command", command(std::env::args_os())), ("date", now())];
+    let made = [("command", command(std::env::args_os(), is_contained())), ("date", now())];
     let processor = ("processor", processor());
     made.into_iter().chain([processor]).map(|(name, text)| (name.to_owned(), text)).collect()
 }
@@ -17,10 +20,13 @@ pub(super) fn processor() -> String {
     name.map_or_else(|| std::env::consts::ARCH.to_owned(), |(_, name)| name.trim().to_owned())
 }
 
-/// The command line as a shell takes it, the program by its name.
-fn command(arguments: impl Iterator<Item = OsString>) -> String {
-    let words = arguments.skip(1).map(|word| quoted(&word.to_string_lossy()));
-    std::iter::once("skinfit".to_owned()).chain(words).collect::<Vec<_>>().join(" ")
+/// The command line as a shell takes it, the program by its name: this one's, or that of the one which contains it.
+fn command(mut arguments: impl Iterator<Item = OsString>, contained: bool) -> String {
+    let program = arguments.next().unwrap_or_default();
+    let name = Path::new(&program).file_name().filter(|_| contained);
+    let name = name.map_or_else(|| "skinfit".to_owned(), |name| quoted(&name.to_string_lossy()));
+    let words = arguments.map(|word| quoted(&word.to_string_lossy()));
+    std::iter::once(name).chain(words).collect::<Vec<_>>().join(" ")
 }
 
 /// A word of a command line, in quotes where a shell would take it apart.
@@ -88,7 +94,9 @@ mod tests {
             "hilite=0.7,0.6,0.5",
             "",
         ];
-        let command = command(words.map(OsString::from).into_iter());
-        assert_eq!(command, r"skinfit fit 'my scene.toml' -o 'it'\''s' --set hilite=0.7,0.6,0.5 ''");
+        let given = |contained| command(words.map(OsString::from).into_iter(), contained);
+        assert_eq!(given(false), r"skinfit fit 'my scene.toml' -o 'it'\''s' --set hilite=0.7,0.6,0.5 ''");
+        let python = ["/usr/bin/python3", "rep.py"].map(OsString::from);
+        assert_eq!(command(python.into_iter(), true), "python3 rep.py");
     }
 }

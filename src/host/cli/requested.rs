@@ -114,6 +114,9 @@ fn goes_on(scene: &FitScene, file: &Path) -> Result<(), Refusal> {
     {
         return Err(other("other free constants"));
     }
+    if kept.fit.bounds != values.bounds {
+        return Err(other("other bounds"));
+    }
     let text = scene_text(&scene.path, changes(values, &names(values.effects)))?;
     let unreadable = |error| Refusal::new(format!("{}: {error}", file.display()));
     let of_file = std::fs::read_to_string(file).map_err(unreadable)?;
@@ -159,6 +162,7 @@ fn changes<'a>(values: &'a Values, effects: &'a [&'static str]) -> Changes<'a> {
     Changes {
         effects: Some(effects),
         free: Some(&values.free),
+        bounds: Some(&values.bounds),
         start: Some(Start { form: values.form, params: &values.params, free: &values.free }),
         free_gains: Some(values.free_gains),
         white_balance: Some(values.white_balance),

@@ -27,6 +27,7 @@ pub(crate) fn observe(
     let values = read.values();
     let mut loaded = read.loaded.clone();
     loaded.scene.params.clone_from(&values.params);
+    loaded.scene.fit.bounds.clone_from(&values.bounds);
     loaded.scene.fit.free = untied(&values.free, &values.params, &[]);
     check(&loaded.scene.fit)?;
     let scene = NamedScene { name: String::new(), loaded };
@@ -54,8 +55,8 @@ impl Free {
             )));
         }
         let mut point = self.baked.start();
-        for ((unknown, &value), name) in self.unknowns.iter().zip(x).zip(&self.names) {
-            let (lower, upper) = unknown.bounds();
+        let bounded = self.unknowns.iter().zip(self.bounds());
+        for (((unknown, (lower, upper)), &value), name) in bounded.zip(x).zip(&self.names) {
             if !value.is_finite() || !(lower..=upper).contains(&value) {
                 let [lower, upper] = [lower, upper].map(short);
                 return Err(Refused::Param(format!(
@@ -75,7 +76,8 @@ impl Free {
 
     /// Least and greatest value of each.
     pub(crate) fn bounds(&self) -> Vec<(f64, f64)> {
-        self.unknowns.iter().map(Unknown::bounds).collect()
+        let within = std::slice::from_ref(&self.baked.scene.fit.bounds);
+        self.unknowns.iter().map(|unknown| unknown.bounds_within(within)).collect()
     }
 
     /// The names of the views.

@@ -3,7 +3,7 @@
 use pyo3::types::{PyDict, PyDictMethods};
 use pyo3::{Bound, PyResult, Python};
 use skinfit_core::model::params::{Column, Param};
-use skinfit_core::scene::{Assignment, suggestion};
+use skinfit_core::scene::{Assignment, check_bounds, suggestion};
 use skinfit_view::values::{Freedom, Values};
 
 use crate::errors::Refused;
@@ -28,7 +28,8 @@ fn row<'py>(py: Python<'py>, values: &Values, param: Param) -> PyResult<Bound<'p
     row.set_item("name", info.name)?;
     row.set_item("value", values.params.rgb(param))?;
     row.set_item("default", param.default_rgb(values.form))?;
-    row.set_item("bounds", (info.lower, info.upper))?;
+    row.set_item("bounds", values.bounds.of(param))?;
+    row.set_item("limits", (info.lower, info.upper))?;
     row.set_item("unit", info.unit)?;
     row.set_item("free", word(values.freedom(param)))?;
     row.set_item("rgb", info.rgb)?;
@@ -70,6 +71,18 @@ pub(crate) fn set_freedom(values: &mut Values, name: &str, word: &str) -> Result
         )));
     }
     values.set_freedom(param, freedom);
+    Ok(())
+}
+
+/// Have a parameter stay within `bounds`, or within the table's.
+pub(crate) fn set_bounds(values: &mut Values, name: &str, bounds: Option<[f64; 2]>) -> Result<(), Refused> {
+    let param = known(values, name)?;
+    let Some(bounds) = bounds else {
+        values.bounds.reset(param);
+        return Ok(());
+    };
+    check_bounds(param, bounds).map_err(|(what, remedy)| Refused::Param(format!("{what}. {remedy}.")))?;
+    values.bounds.set(param, bounds);
     Ok(())
 }
 

@@ -146,6 +146,12 @@ impl Scene {
         Ok(params::set_freedom(&mut locked(&self.0.values), name, freedom)?)
     }
 
+    /// Have a parameter stay within two numbers, or within the model's.
+    #[pyo3(signature = (name, bounds = None))]
+    fn set_bounds(&self, name: &str, bounds: Option<[f64; 2]>) -> PyResult<()> {
+        Ok(params::set_bounds(&mut locked(&self.0.values), name, bounds)?)
+    }
+
     /// Write the scene with its values as a file, with absolute paths.
     fn save(&self, py: Python<'_>, file: PathBuf) -> PyResult<()> {
         let read = Arc::clone(&self.0);

@@ -23,7 +23,9 @@ use crate::waiting::{guarded, locked, next};
 
 /// A function, shared with the thread.
 pub(crate) struct Function {
-    own: Arc<MapFunction>,
+    /// None where it is dropped.
+    own: Option<Arc<MapFunction>>,
+    adapter: String,
     free: Arc<Free>,
     maps: Vec<Map>,
 }
@@ -37,6 +39,15 @@ type Job = Box<dyn FnOnce(&mut Adapters) + Send>;
 
 /// Where jobs are sent to, once there is a thread.
 static THREAD: Mutex<Option<Sender<Job>>> = Mutex::new(None);
+
+/// Tensors go where they live.
+impl Drop for Function {
+    fn drop(&mut self) {
+        if let (Some(own), Ok(jobs)) = (self.own.take(), thread()) {
+            let _ = jobs.send(Box::new(move |_| drop(own)));
+        }
+    }
+}
 
 impl Function {
     /// That none of these constants is one that cannot be free beside these maps of the scene in that file.
@@ -69,11 +80,12 @@ impl Function {
         let map =
             |map: skinfit_tensor::maps::MapInfo| Map { name: map.name, shape: map.shape, bounds: map.bounds };
         let maps = own.maps().into_iter().map(map).collect();
-        Ok(Self { own: Arc::new(own), free: Arc::clone(free), maps })
+        let adapter = own.adapter().to_owned();
+        Ok(Self { own: Some(Arc::new(own)), adapter, free: Arc::clone(free), maps })
     }
 
     pub(crate) fn adapter(&self) -> &str {
-        self.own.adapter()
+        &self.adapter
     }
 
     pub(crate) fn maps(&self) -> &[Map] {
@@ -129,8 +141,11 @@ impl Function {
         py: Python<'_>,
         work: impl FnOnce(&MapFunction) -> Result<T, MapError> + Send + 'static,
     ) -> PyResult<T> {
-        let (own, free) = (Arc::clone(&self.own), Arc::clone(&self.free));
-        there(py, move |_| work(&own).map_err(|error| refused(&error, &free.baked.scene.path)))
+        let (own, free) = (self.own.clone(), Arc::clone(&self.free));
+        there(py, move |_| {
+            let gone = || Refused::Fault("a function was asked for after it was dropped".to_owned());
+            work(own.as_deref().ok_or_else(gone)?).map_err(|error| refused(&error, &free.baked.scene.path))
+        })
     }
 }
 

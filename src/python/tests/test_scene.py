@@ -9,7 +9,7 @@ import OpenEXR
 import pytest
 import skinfit
 
-from conftest import Program
+from conftest import Program, grid, light
 
 
 def test_an_image_is_the_command_lines_to_the_bit(
@@ -33,23 +33,11 @@ def test_an_image_is_the_command_lines_to_the_bit(
     assert drawn.image.dtype == np.float32 and drawn.srgb().dtype == np.uint8
 
 
-def grid(side: int = 8) -> dict[str, np.ndarray[Any, Any]]:
-    """A square of two by two that faces +Z."""
-    places = np.linspace(-1.0, 1.0, side)
-    x, y = np.meshgrid(places, places)
-    positions = np.stack([x, y, 0.2 * np.cos(x) * np.cos(y)], axis=-1).reshape(-1, 3)
-    uvs = np.stack([(x + 1) / 2, (1 - y) / 2], axis=-1).reshape(-1, 2)
-    corner = (np.arange(side - 1)[:, None] * side + np.arange(side - 1)).reshape(-1, 1)
-    triangles = np.concatenate([corner + [0, 1, side], corner + [1, side + 1, side]])
-    return {"positions": positions, "triangles": triangles, "uvs": uvs}
-
-
 def described(**view: Any) -> dict[str, Any]:
-    light = np.ones((16, 32, 3)) * np.linspace(0.5, 1.5, 32)[None, :, None]
     look = {"name": "front", "eye": [0.0, 0.0, 4.0], "look_at": [0.0, 0.0, 0.0], "fov_y_degrees": 40.0}
     return {
         "mesh": {"file": grid()},
-        "environment": {"file": light},
+        "environment": {"file": light()},
         "maps": {"color": np.full((4, 4, 3), 0.5)},
         "model": {"effects": ["diffuse"], "params": {"base_weight": 0.6}},
         "view": [{**look, "width": 32, "height": 24, **view}],
@@ -75,7 +63,7 @@ def test_a_scene_of_arrays_is_drawn_and_fitted(cache: Path, tmp_path: Path) -> N
     [
         ({"target": np.ones((24, 32, 5))}, skinfit.ArrayError, "no image"),
         ({"target": np.ones((3, 3, 3))}, skinfit.SceneError, "target"),
-        ({"width": "wide"}, skinfit.SceneError, "width"),
+        ({"width": "wide"}, skinfit.SceneError, "line 19: invalid type: string"),
         ({"widht": 3}, skinfit.SceneError, "Did you mean `width`"),
         ({"eye": object()}, skinfit.SceneError, "eye"),
     ],
@@ -119,10 +107,10 @@ def test_a_view_that_there_is_not_is_a_view_error(scene: skinfit.Scene) -> None:
         skinfit.load_file(scene.path, effects=["difuse"])
 
 
-def test_other_effects_are_read_where_they_are_named(scene: skinfit.Scene, cache: Path) -> None:
-    plain = skinfit.load_file(scene.path, effects=["diffuse"], cache=cache)
-    assert plain.effects == ["diffuse"] and "hilite" not in plain.params
-    assert not np.array_equal(plain.render().image, scene.render().image)
+def test_other_effects_are_read_where_they_are_named(small: skinfit.Scene, cache: Path, unwarned: None) -> None:
+    plain = skinfit.load_file(small.path, effects=["diffuse", "hilite"], cache=cache)
+    assert plain.effects == ["diffuse", "hilite"] and "rim_weight" not in plain.params
+    assert not np.array_equal(plain.render().image, small.render().image)
 
 
 def test_what_was_mended_is_a_warning(cache: Path, demo_file: Path) -> None:

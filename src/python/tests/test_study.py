@@ -12,8 +12,9 @@ import skinfit
 from skinfit.table import Table, read_csv
 
 
-def test_an_ablation_is_a_table(scene: skinfit.Scene, fitted: skinfit.Fit, tmp_path: Path) -> None:
-    study = scene.ablate(gpu="never", params=fitted.run / "params.toml")
+def test_an_ablation_is_a_table(small: skinfit.Scene, tmp_path: Path, unwarned: None) -> None:
+    found = small.fit(engine="cpu")
+    study = small.ablate(gpu="never", params=found.run / "params.toml")
     rows = study.rows()
     assert {"left_out", "view", "loss", "psnr_db"} <= set(rows[0])
     assert {"rim", "hilite"} <= {row["left_out"] for row in rows}
@@ -22,17 +23,17 @@ def test_an_ablation_is_a_table(scene: skinfit.Scene, fitted: skinfit.Fit, tmp_p
     assert (study.save(tmp_path / "kept") / "report.html").is_file()
 
 
-def test_a_tradeoff_has_a_plot_for_each_axis(scene: skinfit.Scene) -> None:
-    study = scene.tradeoff(axes=["filter"])
+def test_a_tradeoff_has_a_plot_for_each_axis(small: skinfit.Scene, unwarned: None) -> None:
+    study = small.tradeoff(axes=["filter"])
     assert list(study.plots) == ["filter"] and "<svg" in study.plots["filter"]
     assert all(row["axis"] == "filter" for row in study.rows())
     assert "<iframe" in study._repr_html_()
     with pytest.raises(skinfit.StudyError, match="unknown axis"):
-        scene.tradeoff(axes=["fliter"])
+        small.tradeoff(axes=["fliter"])
 
 
-def test_a_study_of_stability_has_a_row_for_each_case(scene: skinfit.Scene) -> None:
-    study = scene.stability(gpu=False, cases=250, pixels=1000)
+def test_a_study_of_stability_has_a_row_for_each_case(small: skinfit.Scene, unwarned: None) -> None:
+    study = small.stability(gpu=False, cases=10, pixels=1000)
     rows = study.rows()
     assert not study.failed and all(row["failure"] is None for row in rows)
     assert {row["search"] for row in rows} == {"hard", "random", "lights", "scene"}
@@ -50,7 +51,9 @@ def test_changed_values_go_into_a_study(scene: skinfit.Scene, tmp_path: Path) ->
 def test_ctrl_c_ends_a_study(demo_file: Path, tmp_path: Path) -> None:
     script = textwrap.dedent(
         f"""
-        import skinfit
+        import signal, skinfit
+        # Of what a shell runs in the background Ctrl-C is ignored, until somebody says otherwise.
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         scene = skinfit.load_file({str(demo_file)!r})
         print("begun", flush=True)
         try:

@@ -8,6 +8,8 @@ import skinfit
 import skinfit.torch
 import torch
 
+from test_docs import run_blocks, run_docstrings
+
 
 @pytest.fixture(scope="module")
 def objective(demo_file: Path, cache: Path) -> skinfit.Objective:
@@ -124,3 +126,8 @@ def test_maps_that_a_network_makes_are_fitted(of_maps: skinfit.MapObjective) -> 
 def test_maps_are_of_functions_of_maps(objective: skinfit.Objective) -> None:
     with pytest.raises(skinfit.ArrayError, match="map_objective"):
         skinfit.torch.loss(objective, maps={"color": torch.ones(2, 2, 3)})
+
+
+def test_the_examples_run(adapter: None, unwarned: None) -> None:
+    run_docstrings("skinfit.torch")
+    assert run_blocks(torch=True) >= 1

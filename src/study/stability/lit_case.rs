@@ -15,7 +15,8 @@ use super::reference::{Moves, moved, moved_params};
 use crate::bake::reflected::ReflectedStack;
 use crate::bake::{Illumination, LobeStack};
 use crate::model::choices::{
-    Bounces, Choices, LobeLookup, SkinReflection, SpecularMap, SpecularModel, SpecularVisibility, SplitSum,
+    Bounces, Choices, LobeLookup, NormalFilter, SkinReflection, SpecularMap, SpecularModel,
+    SpecularVisibility, SplitSum,
 };
 use crate::model::cube::Cube;
 use crate::model::effects::{Effect, Effects, Form, Prerequisite, Silhouette};
@@ -195,6 +196,7 @@ fn setup(probes: &Probes, rng: &mut StdRng) -> Setup {
         specular_visibility: one_of(rng, &SpecularVisibility::ALL),
         lobe_lookup: one_of(rng, &LobeLookup::ALL),
         specular_map: one_of(rng, &SpecularMap::ALL),
+        normal_filter: one_of(rng, &NormalFilter::ALL),
         bounces: one_of(rng, &Bounces::ALL),
         skin_reflection: one_of(rng, &SkinReflection::ALL),
         // What may be free is.

@@ -11,6 +11,7 @@ use crate::bake::Illumination;
 use crate::gpu::probe::{constants, evaluate};
 use crate::gpu::upload::Content;
 use crate::gpu::{Choice, Gpu, GpuError};
+use crate::model::bounds::Bounds;
 use crate::model::dapple::Dapple;
 use crate::model::effects::{Effect, Effects, Form, Lookups, Silhouette};
 use crate::model::evaluate::Setup;
@@ -208,6 +209,7 @@ fn scene() -> Scene {
         fit: FitSettings {
             free: Vec::new(),
             loss: Loss::L2,
+            bounds: Bounds::default(),
             free_gains: false,
             white_balance: false,
             cameras: false,

@@ -43,6 +43,7 @@ fn run_fit(job: &Job, scene: &Path, cache: Option<&Path>) -> Result<Figures, Job
         max_iterations: job.whole("max_iterations"),
         starts: job.whole("starts").and_then(|n| u32::try_from(n).ok()).unwrap_or(1),
         seed: job.whole("seed").unwrap_or(0),
+        bounds: vec![observed.scene.fit.bounds.clone()],
         widths: observed.image_widths(),
         ..FitOptions::default()
     };

@@ -27,7 +27,7 @@ use crate::samples::{self, Atlas, Hit, PosedSurface, SampleError, SurfaceBakes, 
 use crate::scene::diffusion::Diffusion;
 use crate::scene::names::names_of;
 use crate::scene::view::View;
-use crate::scene::{Loss, Scene};
+use crate::scene::{Loss, Quality, Scene};
 use crate::subject::{SampledScene, shaded};
 use crate::timing::seconds_of;
 
@@ -58,7 +58,7 @@ pub struct Bench<'a> {
 }
 
 /// All that a way to a quantity changes of a scene.
-type Chosen = (Choices, Diffusion, Effects, Params);
+type Chosen = (Choices, Diffusion, Effects, Quality, Params);
 
 /// A scene by other named choices.
 #[derive(Debug)]
@@ -157,7 +157,7 @@ impl<'a> Bench<'a> {
     /// # Errors
     /// As [`Self::way`].
     pub fn reference(&self, scene: Scene) -> Result<Arc<TimedImages>, StudyError> {
-        let chosen = (scene.choices, scene.diffusion, scene.effects, scene.params.clone());
+        let chosen = (scene.choices, scene.diffusion, scene.effects, scene.quality, scene.params.clone());
         if let Some((_, made)) = self.references.borrow().iter().find(|(of, _)| *of == chosen) {
             return Ok(Arc::clone(made));
         }

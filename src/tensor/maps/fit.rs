@@ -172,7 +172,8 @@ impl<'a> Fixed<'a> {
             loss: self.scene.fit.loss,
             unknowns: self.unknowns.clone(),
         })?;
-        let options = FitOptions { interrupt: self.interrupt.clone(), ..FitOptions::default() };
+        let bounds = vec![self.scene.fit.bounds.clone()];
+        let options = FitOptions { bounds, interrupt: self.interrupt.clone(), ..FitOptions::default() };
         let outcome = fit::fit(&engine, start, &options, &mut |_| {})?;
         Ok((outcome.end, (outcome.loss_start, outcome.loss_end)))
     }

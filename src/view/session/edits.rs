@@ -65,9 +65,12 @@ impl Session {
 
     /// Move a slider, as part of a drag; it stays within its bounds.
     pub fn slide(&mut self, column: Column, value: f64) {
-        let (lower, upper) = column.param.info().range();
         if value.is_finite() {
-            self.drag(|values| column.set(&mut values.params, value.clamp(lower, upper)));
+            self.drag(|values| {
+                let own = values.bounds.own(column.param);
+                let (lower, upper) = own.unwrap_or_else(|| column.param.info().range());
+                column.set(&mut values.params, value.clamp(lower, upper));
+            });
         }
     }
 

@@ -26,9 +26,16 @@ impl Session {
         let fitted = self.fitted().map_or(0.0, |params| column.get(params));
         let most = known.into_iter().chain([fitted]).fold(0.25, |most: f64, value| most.max(value.abs()));
         let most = if info.unit == "degrees" { 180.0 } else { 4.0 * most };
-        let lower = if info.lower.is_finite() { info.lower } else { -most };
-        let upper = if info.upper.is_finite() { info.upper } else { most };
+        let (lower, upper) = self.bounds(column.param);
+        let lower = if lower.is_finite() { lower } else { -most };
+        let upper = if upper.is_finite() { upper } else { most };
         lower..=upper
+    }
+
+    /// What a fit keeps a parameter within: the scene's bounds, or the table's.
+    #[must_use]
+    pub fn bounds(&self, param: Param) -> (f64, f64) {
+        self.first().map_or((param.info().lower, param.info().upper), |first| first.bounds.of(param))
     }
 
     /// Values that a parameter can be reset to, by the names of what has them.

@@ -143,7 +143,8 @@ impl Row<'_> {
         let info = self.param.info();
         let unit = if info.unit.is_empty() { String::new() } else { format!(" {}", info.unit) };
         ui.label(info.meaning);
-        ui.label(format!("bounds {} to {}{unit}", info.lower, info.upper));
+        let (lower, upper) = self.session.bounds(self.param);
+        ui.label(format!("bounds {lower} to {upper}{unit}"));
         ui.weak(info.source);
     }
 

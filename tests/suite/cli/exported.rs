@@ -158,6 +158,64 @@ fn a_material_includes_the_shader_by_its_name() {
 }
 
 #[test]
+fn a_material_for_unity_is_a_folder_beside_the_cubes() {
+    let sandbox = Sandbox::new();
+    sandbox.fit("run", &[]).done();
+    let bake = ["bake", "scene.toml", "--params", "run/params.toml", "-o", "baked", "--cubes", "dds"];
+    sandbox.run(&bake).done();
+    let export = |output: &str| {
+        sandbox.run(&["export", "run/params.toml", "--to", "unity", "--material", "Skin.hlsl", "-o", output])
+    };
+    let said = export("baked/Skin.mat").done().out;
+    assert!(said.starts_with("wrote baked/Skin.mat, and beside it "), "{said}");
+    let saved = sandbox.text("baked/Skin.mat");
+    let shader = sandbox.text("baked/Skin.shader");
+    for texture in ["Skin_color.png", "Skin_normal.png", "irradiance.dds", "hilite.dds"] {
+        assert!(sandbox.path("baked").join(texture).is_file(), "{texture}");
+        let meta = sandbox.text(&format!("baked/{texture}.meta"));
+        let guid = meta.lines().find_map(|line| line.strip_prefix("guid: ")).unwrap();
+        assert!(saved.contains(guid) && said.contains(&format!("{texture}.meta")), "{texture}: {said}");
+    }
+    // A constant of the fit, in 32 bits.
+    let json = sandbox.run(&["export", "run/params.toml", "--to", "json"]).done().out;
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let occlusion = json["constants"]["occlusion"].as_f64().unwrap() as f32;
+    assert!(saved.contains(&format!("    - _SKINFIT_OCCLUSION: {occlusion}\n")), "{saved}");
+    assert!(shader.contains(&format!("Float) = {occlusion}\n")), "{shader}");
+    // A name that stands in the shader's text, too.
+    export("baked/SHADER_BUFFER.mat").done();
+    let named = sandbox.text("baked/SHADER_BUFFER.shader").replace("SHADER_BUFFER", "Skin");
+    assert_eq!(named, shader);
+    // Once more, nothing changes, and what Unity has made of a `.meta` stays.
+    let before = sandbox.files();
+    assert!(!export("baked/Skin.mat").done().out.contains(".meta"));
+    assert!(sandbox.files() == before, "another export");
+}
+
+#[test]
+fn a_material_for_unity_that_cannot_be_leaves_nothing() {
+    let sandbox = Sandbox::new();
+    sandbox.fit("run", &[]).done();
+    let before = sandbox.files();
+    let export =
+        |more: &[&str]| sandbox.run(&[&["export", "run/params.toml", "--to", "unity", "-o"], more].concat());
+    export(&["Skin.mat"]).refused(&["Skin.mat: no material holds a shader's text", "--material Skin.hlsl"]);
+    let twice = export(&["Skin.mat", "--material", "Skin.shader"]);
+    twice.refused(&["Skin.shader", "another file of that name"]);
+    // A file stands where the folder should.
+    let under = export(&["scene.toml/Skin.mat", "--material", "Skin.hlsl"]);
+    assert!(under.code == Some(2) && under.err.contains("scene.toml/"), "{under:?}");
+    assert!(sandbox.files() == before, "something was written");
+    // What the scene reads is not written over.
+    sandbox.write("Skin_color.png", &sandbox.read("color.png"));
+    sandbox.edit("color = \"color.png\"", "color = \"Skin_color.png\"");
+    let before = sandbox.files();
+    export(&["Skin.mat", "--material", "Skin.hlsl", "--scene", "scene.toml"])
+        .refused(&["Skin_color.png: the scene was read from this file", "another name or folder"]);
+    assert!(sandbox.files() == before, "something was written");
+}
+
+#[test]
 fn exports_that_cannot_be() {
     let nothing = |_: &Sandbox| {};
     let alone =

@@ -312,6 +312,23 @@ fn ways_to_the_skys_light_are_measured_beside_rays() {
 }
 
 #[test]
+fn bumps_below_a_sample_are_measured_beside_many_samples() {
+    let sandbox = Sandbox::new();
+    sandbox.edit("\"reflection\"]", "\"reflection\", \"lights\", \"light_specular\"]");
+    sandbox.edit("file = \"env.exr\"", "file = \"env.exr\"\nlights = 2");
+    done(sandbox.run(&["tradeoff", "scene.toml", "-o", "cost", "--axis", "normal_filter"]));
+    let settings = settings(&sandbox, "cost", "normal_filter");
+    let reference: Vec<&str> =
+        settings.iter().filter(|s| s["reference"] == true).map(|s| s["name"].as_str().unwrap()).collect();
+    assert_eq!((settings.len(), reference), (5, vec!["bilinear, many samples"]));
+    let off = |name: &str| error(named(&settings, name));
+    assert!(off("bilinear, many samples") == 0.0 && off("trilinear, none") > 0.0, "{settings:?}");
+    sandbox.write("plain.toml", super::sandbox::SCENE.as_bytes());
+    let idle = ["tradeoff", "plain.toml", "-o", "none", "--axis", "normal_filter"];
+    sandbox.run(&idle).refused(&["normal_filter", "light_specular is off"]);
+}
+
+#[test]
 fn the_most_lights_of_a_panorama_are_what_fewer_are_measured_against() {
     let sandbox = Sandbox::new();
     sandbox.edit("\"reflection\"]", "\"reflection\", \"lights\", \"shadows\"]");

@@ -25,6 +25,7 @@ mod frames;
 mod fused;
 mod levels;
 mod light_vectors;
+mod normals;
 mod parity;
 mod pictures;
 pub(crate) mod raw;

@@ -2,7 +2,7 @@
 //! reads.
 
 mod godot;
-mod unity;
+pub mod unity;
 mod unreal;
 
 use super::function::{is_color, meaning, planned, what_to_bind};
@@ -28,16 +28,26 @@ pub fn material(target: Target, facts: &Facts, params: &Params, shader: &str) ->
     if !ENGINES.contains(&target) {
         return Err(ExportError::NoMaterial { target: target.name(), engines: engines() });
     }
+    with_parts(facts, params, shader, |parts| match target {
+        Target::Unity => unity::shader::text(parts, "Skin"),
+        Target::Unreal => unreal::text(parts),
+        _ => godot::text(parts),
+    })
+}
+
+/// What `make` makes of a material's parts.
+fn with_parts<T, E: From<ExportError>>(
+    facts: &Facts,
+    params: &Params,
+    shader: &str,
+    make: impl FnOnce(&Parts<'_>) -> Result<T, E>,
+) -> Result<T, E> {
     let (plan, resources, _) = planned(facts, params)?;
     if !plan.passes.is_empty() {
-        return Err(ExportError::Unfilled { what: "textures that passes over the UV atlas make".to_owned() });
+        let what = "textures that passes over the UV atlas make".to_owned();
+        return Err(ExportError::Unfilled { what }.into());
     }
-    let parts = Parts { plan: &plan, resources: &resources, params, shader };
-    match target {
-        Target::Unity => unity::text(&parts),
-        Target::Unreal => unreal::text(&parts),
-        _ => godot::text(&parts),
-    }
+    make(&Parts { plan: &plan, resources: &resources, params, shader })
 }
 
 /// What a material is made of.
@@ -50,6 +60,8 @@ struct Parts<'a> {
 
 /// A cube or map that the shader reads.
 struct Bound {
+    /// What the shader reads.
+    resource: Resource,
     /// Its name in the shader.
     name: String,
     /// Whether it is a cube.
@@ -88,7 +100,8 @@ impl Parts<'_> {
         let bound = |&resource: &Resource| {
             let words = what_to_bind(resource, self.params)?;
             let name = names::function(resource.name());
-            Some(Bound { name, cube: resource.kind() == Kind::Cube, color: is_color(resource), words })
+            let (cube, color) = (resource.kind() == Kind::Cube, is_color(resource));
+            Some(Bound { resource, name, cube, color, words })
         };
         self.resources.iter().filter_map(bound)
     }

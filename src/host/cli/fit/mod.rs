@@ -22,6 +22,7 @@ use super::run_folder::RunFolder;
 use super::scene::{HoldOutArguments, ScenesArguments};
 use super::set::SetArguments;
 use super::{Exit, Refusal, quieten_graphics, unfinished};
+use crate::contained::is_contained;
 use crate::engine::Point;
 use crate::fit::outcome::Iteration;
 use crate::model::params::Param;
@@ -90,6 +91,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     run_watched(arguments, &Interrupt::default(), &mut |_, _| {}).map(|(exit, _)| exit)
 }
 
+/// What Ctrl-C leaves while scenes are read and baked.
+const BEFORE_THE_SEARCH: &str =
+    "interrupted before the search began: the run folder is as it was; only bakes in the cache were kept.";
+
 /// As [`run`], watched: how it ended, and where in each scene.
 pub(super) fn run_watched(
     arguments: &Arguments,
@@ -101,13 +106,15 @@ pub(super) fn run_watched(
     if arguments.engine.may_be_gpu() {
         quieten_graphics();
     }
-    unfinished::install_saying(
-        "interrupted before the search began: the run folder is as it was; only bakes in the cache were kept.".into(),
-    );
+    unfinished::install_saying(BEFORE_THE_SEARCH.into());
     let mut folder = RunFolder::open(arguments.output.as_deref(), &arguments.scenes.named)?;
     let loaded = scenes::read(arguments, folder.path())?;
     let solving = Solving::of(arguments, folder.path())?;
     let (scenes, maps) = Scenes::ready(arguments, loaded, interrupt)?;
+    // Nothing ends the process of a program that contains this one: who has given up wants no run.
+    if is_contained() && interrupt.is_set() {
+        return Err(Refusal::failure(BEFORE_THE_SEARCH));
+    }
     let outcome = solve(arguments, solving, &folder, &scenes, interrupt, watch)?;
     folder.keep();
     // Of an earlier fit of the window: this one started elsewhere.

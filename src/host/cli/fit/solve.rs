@@ -70,6 +70,7 @@ pub(super) fn solve(
         max_iterations: arguments.max_iterations,
         starts: solving.starts,
         seed: solving.seed,
+        bounds: scenes.bounds(),
         fingerprint: fingerprint_of(scenes),
         resume: arguments.resume.then(|| state.clone()),
         state: (!maps).then_some(state),

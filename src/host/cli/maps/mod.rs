@@ -109,6 +109,7 @@ impl MapArguments {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::bounds::Bounds;
     use crate::model::params::Column;
     use crate::scene::{Loss, MapSettings};
 
@@ -121,6 +122,7 @@ mod tests {
             let mut fit = FitSettings {
                 free,
                 loss,
+                bounds: Bounds::default(),
                 free_gains: false,
                 white_balance: false,
                 cameras: false,

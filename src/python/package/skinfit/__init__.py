@@ -11,7 +11,7 @@
 
 Images are linear Rec.709 radiance, premultiplied by coverage, row by row from the top; angles are degrees, lengths the
 scene's own. What is refused raises an `Error` of a class a kind, with a paragraph on what to do; Ctrl-C ends what is under
-way; other threads go on meanwhile. `skinfit.torch` has the same as a function of PyTorch's.
+way; other threads go on meanwhile. `skinfit.torch` and `skinfit.jax` have the same as functions of PyTorch's and JAX's.
 """
 
 from . import _native
@@ -37,6 +37,7 @@ from .errors import (  # noqa: E402
 from .fit import Fit, FitOptions, FitSteps, Iteration, Scores, Step, fit, fit_steps, load_run  # noqa: E402
 from .maps import MapGradients, MapObjective  # noqa: E402
 from .objective import NormalEquations, Objective  # noqa: E402
+from .page import Page  # noqa: E402
 from .params import ParamInfo, Params  # noqa: E402
 from .rendering import Rendering  # noqa: E402
 from .scene import Scene, View, demo, load_dict, load_file  # noqa: E402
@@ -61,6 +62,7 @@ __all__ = [
     "MapObjective",
     "NormalEquations",
     "Objective",
+    "Page",
     "ParamError",
     "ParamInfo",
     "Params",

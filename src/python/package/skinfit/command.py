@@ -19,6 +19,8 @@ from .errors import Error
 # How long a command that was interrupted may take to tidy up.
 _PATIENCE = 10.0
 _NAME = "skinfit: "
+PLAYER = Path(__file__).resolve().parent / "player.html"
+"""The page without a scene, where the wheel was packed with one."""
 
 
 class Said(NamedTuple):
@@ -34,7 +36,11 @@ class Said(NamedTuple):
 
 def main() -> NoReturn:
     """Run the program on this process' words."""
-    sys.exit(_native.run_program(["skinfit", *sys.argv[1:]]))
+    words = sys.argv[1:]
+    named = any(word.split("=")[0] == "--player" for word in words)
+    if words[:1] == ["page"] and PLAYER.is_file() and not named:
+        words.append(f"--player={PLAYER}")
+    sys.exit(_native.run_program(["skinfit", *words]))
 
 
 def run(words: Sequence[str], refused: type[Error]) -> Said:

@@ -8,9 +8,11 @@ from __future__ import annotations
 import contextlib
 import json
 import tempfile
+import threading
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypedDict, Union
@@ -20,8 +22,10 @@ from numpy.typing import NDArray
 
 from . import _native
 from .command import run as run_command
-from .errors import Error, FitError, SkinfitWarning
+from .errors import FitError, SkinfitWarning
 from .html import framed
+from .page import Page
+from .page import write as write_page
 from .params import Value
 from .progress import Progress
 from .study import copy
@@ -105,7 +109,7 @@ class Fit:
     def __init__(
         self,
         run: Path,
-        scenes: Sequence[Scene],
+        scenes: Sequence[Scene] | Callable[[], Sequence[Scene]],
         text: str = "",
         scratch: tempfile.TemporaryDirectory[str] | None = None,
     ) -> None:
@@ -113,10 +117,14 @@ class Fit:
         """The run folder."""
         self.report: dict[str, Any] = _report(run)
         """All numbers, as `report.json` has them."""
-        self._scenes = list(scenes)
+        self._read = scenes if callable(scenes) else lambda: scenes
         self._text = text
         # A run folder that goes with this.
         self._scratch = scratch
+
+    @cached_property
+    def _scenes(self) -> list[Scene]:
+        return list(self._read())
 
     @property
     def ending(self) -> Ending:
@@ -220,6 +228,15 @@ class Fit:
             _warn(said.told)
             return place.read_text(encoding="utf-8")
 
+    def page(self, file: FilePath | None = None, *, player: FilePath | None = None, title: str | None = None) -> Page:
+        """The fit as a page for a browser, with sliders, images and fits (`skinfit page`): one file that needs nothing else,
+        by default `page.html` in the run folder, which the report links to. It holds the scene's files: whoever has it has
+        these. `player`: see `skinfit.page`. Raises `FileError`."""
+        place = Path(file) if file is not None else self.run / "page.html"
+        cache = self._scenes[0]._cache_words() if self._scenes else []
+        words = [str(self.run), *cache, *([] if title is None else [f"--title={title}"])]
+        return write_page(words, place, player, self._scratch)
+
     def __repr__(self) -> str:
         if self._text:
             return self._text
@@ -253,8 +270,16 @@ class FitSteps(Iterator[Step]):
         self.last = Step(iteration, evaluations, loss, seconds, scenes[0], scenes)
         return self.last
 
+    def __del__(self) -> None:
+        """Left without a result: it ends, and its folder stays until it has."""
+        if not self._native.is_over:
+            self._native.stop()
+            with contextlib.suppress(RuntimeError):
+                threading.Thread(target=_see_off, args=(self._native, self._scratch), daemon=True).start()
+
     def stop(self) -> None:
-        """Have the fit end after the iteration that it is at, with what it has found and a state to be resumed."""
+        """Have the fit end after the iteration that it is at, with what it has found and a state to be resumed. Before the first
+        step nothing is found: `result` raises `FitError`."""
         self._native.stop()
 
     def result(self) -> Fit:
@@ -262,6 +287,13 @@ class FitSteps(Iterator[Step]):
         said, told = self._native.finish()
         _warn(told)
         return Fit(self._run, self._scenes, "\n".join(said), self._scratch)
+
+
+def _see_off(native: _native.Fitting, scratch: Any) -> None:
+    """Wait for a fit that nobody waits for; then its folder goes."""
+    with contextlib.suppress(Exception):
+        native.finish()
+    del scratch
 
 
 def fit_steps(
@@ -322,6 +354,13 @@ def fit(
     while scenes are read and baked, nothing is there to keep, and `KeyboardInterrupt` is raised, as it is by Ctrl-C a second
     time. Python's lock is free meanwhile. Raises `FitError` and `SkinError` with the command line's paragraph. A fit that did
     not converge is no error: a `SkinfitWarning` says what to do.
+
+    >>> import skinfit
+    >>> found = skinfit.fit([skinfit.demo()], engine="cpu")
+    >>> found.converged, round(found.params["base_weight"], 3)
+    (True, 0.85)
+    >>> sorted(found.scores)
+    ['front', 'profile', 'three_quarter']
     """
     steps = fit_steps(scenes, run=run, resume=resume, hold_out=hold_out, **options)
     shown = Progress(progress)
@@ -337,7 +376,7 @@ def fit(
             raise
     except BaseException:
         steps.stop()
-        with contextlib.suppress(Error):
+        with contextlib.suppress(Exception):
             steps.result()
         raise
     finally:
@@ -352,7 +391,8 @@ def load_run(folder: FilePath) -> Fit:
     run = Path(folder)
     report = _report(run)
     several = [file for file in report["files"] if file.startswith("scenes/") and file.endswith(".toml")]
-    return Fit(run, [load_file(run / file) for file in several or ["scene.toml"]])
+    # Read where they are asked for: what was found stands without the files that they name.
+    return Fit(run, lambda: [load_file(run / file) for file in several or ["scene.toml"]])
 
 
 def _report(run: Path) -> dict[str, Any]:

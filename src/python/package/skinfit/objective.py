@@ -41,6 +41,16 @@ class Objective:
 
     Loss, gradient and normal equations are those of the CPU engine, by the numbers of which `Scene.fit` goes. Images and
     products of their Jacobian are computed in float64.
+
+    >>> import skinfit
+    >>> scene = skinfit.demo()
+    >>> scene.params.free_only("base_weight", "rim_exponent")
+    >>> f = scene.objective()
+    >>> f.names, f.start.tolist()
+    (['base_weight', 'rim_exponent'], [1.0, 2.0])
+    >>> loss, gradient = f.loss_and_gradient(f.start)
+    >>> gradient.shape, f.normal_equations(f.start).jtj.shape, f.image(f.start, "front").shape
+    ((2,), (2, 2), (320, 320, 3))
     """
 
     def __init__(self, native: _native.Objective) -> None:

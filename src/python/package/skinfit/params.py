@@ -30,7 +30,9 @@ class ParamInfo:
     default: Value
     """The default of the scene's form of the model."""
     bounds: tuple[float, float]
-    """Least and greatest value; they are the model's, and infinite where there is none."""
+    """Least and greatest value that a fit may give it."""
+    limits: tuple[float, float]
+    """Those of the model, which bounds lie within; infinite where there is none."""
     unit: str
     """Empty for a pure number."""
     free: Freedom
@@ -50,6 +52,15 @@ class Params(MutableMapping[str, Value]):
     `params["hilite"]` is a float, or three where channels differ; `params["hilite"] = 0.5` and
     `params["hilite"] = (0.7, 0.6, 0.5)` set it. `free` and `fix` say what a fit moves, `info` has the whole row.
     A parameter that is set to three values and is free moves in each channel. Nothing can be removed.
+
+    >>> import skinfit
+    >>> params = skinfit.demo().params
+    >>> params["hilite"] = (0.7, 0.6, 0.5)
+    >>> params.free_only("base_weight", per_channel=["hilite"])
+    >>> [row.name for row in params.rows() if row.free != "fixed"]
+    ['base_weight', 'hilite']
+    >>> params.info("rim_exponent").bounds
+    (0.25, 16.0)
     """
 
     def __init__(self, scene: _native.Scene) -> None:
@@ -99,6 +110,15 @@ class Params(MutableMapping[str, Value]):
         self.free(*names)
         self.free(*per_channel, per_channel=True)
 
+    def bound(self, name: str, lower: float | None = None, upper: float | None = None) -> None:
+        """Have a fit keep it from `lower` to `upper`, in each channel; with neither, within the model's limits. One that is left
+        out is the model's, where that is finite. Raises `ParamError` where the model does not let it."""
+        if lower is None and upper is None:
+            self._scene.set_bounds(name, None)
+            return
+        least, greatest = self.info(name).limits
+        self._scene.set_bounds(name, (least if lower is None else lower, greatest if upper is None else upper))
+
     def reset(self, *names: str) -> None:
         """Take the model's defaults for these; without names, for all."""
         for name in names or tuple(self):
@@ -142,11 +162,13 @@ def _value(rgb: Sequence[float]) -> Value:
 
 def _info(row: _native._Row) -> ParamInfo:
     lower, upper = row["bounds"]
+    least, greatest = row["limits"]
     return ParamInfo(
         name=row["name"],
         value=_value(row["value"]),
         default=_value(row["default"]),
         bounds=(lower, upper),
+        limits=(least, greatest),
         unit=row["unit"],
         free=row["free"],
         rgb=row["rgb"],

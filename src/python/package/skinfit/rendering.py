@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -29,3 +31,17 @@ class Rendering:
         curved = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
         codes: NDArray[np.uint8] = np.round(255.0 * curved).astype(np.uint8)
         return codes
+
+    def _repr_png_(self) -> bytes:
+        """What a notebook shows: the image as `srgb` has it."""
+        codes = self.srgb()
+        height, width, _ = codes.shape
+        # Each row begins with the filter that it is stored by: none.
+        rows = np.concatenate([np.zeros((height, 1), np.uint8), codes.reshape(height, 3 * width)], axis=1)
+        header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+        chunks = [(b"IHDR", header), (b"sRGB", b"\0"), (b"IDAT", zlib.compress(rows.tobytes())), (b"IEND", b"")]
+        return b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(kind, content) for kind, content in chunks)
+
+
+def _chunk(kind: bytes, content: bytes) -> bytes:
+    return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))

@@ -9,12 +9,13 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, NamedTuple, Union
 
-from . import _native, study
+from . import _native, page, study
 from .described import describe
 from .errors import ArrayError, SkinfitWarning
 from .fit import Fit, FitSteps, Step, fit, fit_steps
 from .maps import MapObjective
 from .objective import Objective
+from .page import Page
 from .params import Params
 from .rendering import Rendering
 from .study import Study
@@ -88,6 +89,13 @@ class Scene:
         With `terms`, its layers and haze too. Numbers are float32, linear Rec.709 radiance, premultiplied by coverage.
         The first image of a view, and one after a change of what is not a weight, takes bakes and samples; others are
         quick. Raises `ViewError` where there is no such view, `SceneError` where it sees nothing of the mesh.
+
+        >>> import skinfit
+        >>> drawn = skinfit.demo().render("front", terms=True)
+        >>> drawn.image.shape, drawn.image.dtype
+        ((320, 320, 3), dtype('float32'))
+        >>> "hilite" in drawn.layers
+        True
         """
         drawn, warned = self._native.render(view, terms)
         self._warn_once(warned)
@@ -153,6 +161,15 @@ class Scene:
         """Hard cases on every evaluator: `skinfit.stability` of this scene alone."""
         return study.stability([self], **options)
 
+    def page(self, file: FilePath | None = None, *, player: FilePath | None = None, title: str | None = None) -> Page:
+        """The scene at its values as a page for a browser, with sliders, images and fits: `Fit.page` says more. Without a
+        `file` it goes with the `Page`."""
+        scratch = page.scratch()
+        place = Path(scratch.name) / "page.html" if file is None else Path(file)
+        with tempfile.TemporaryDirectory(prefix="skinfit-") as changed:
+            words = [str(self._file(Path(changed))), *self._cache_words()]
+            return page.write([*words, *([] if title is None else [f"--title={title}"])], place, player, scratch)
+
     def save(self, file: FilePath) -> None:
         """Write the scene with its values as a scene file whose paths are absolute. Raises `FileError`."""
         self._native.save(file)
@@ -187,6 +204,11 @@ def load_file(path: FilePath, *, effects: Sequence[str] | None = None, cache: Ca
     """Read a scene file, with its targets; with other `effects` than it names if they are given.
 
     Raises `SceneError` with file, line, what is wrong and what to do. What was mended is a `SkinfitWarning`.
+
+    >>> import skinfit
+    >>> scene = skinfit.load_file(skinfit.demo().path)
+    >>> [view.name for view in scene.views]
+    ['front', 'three_quarter', 'profile']
     """
     return Scene(_native.Scene(path, _cache(cache), _list(effects)))
 
@@ -211,6 +233,22 @@ def load_dict(
     Arrays are written into `folder`, which is made if need be, beside the scene as `scene.toml`; without one into a
     folder that goes with the scene. Paths are relative to the working folder. Raises `ArrayError` for arrays of other
     shapes, `SceneError` as `load_file` does.
+
+    >>> import numpy as np, skinfit
+    >>> square = {
+    ...     "positions": [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]],
+    ...     "uvs": [[0, 1], [1, 1], [1, 0], [0, 0]],
+    ...     "triangles": [[0, 1, 2], [0, 2, 3]],
+    ... }
+    >>> look = {"name": "front", "eye": [0, 0, 3], "look_at": [0, 0, 0], "fov_y_degrees": 50, "width": 8, "height": 6}
+    >>> scene = skinfit.load_dict({
+    ...     "mesh": {"file": square},
+    ...     "environment": {"file": np.ones((4, 8))},
+    ...     "model": {"effects": ["diffuse"], "params": {"base_weight": 0.5}},
+    ...     "view": [look],
+    ... })
+    >>> scene.render().image[3, 4].round(3).tolist()
+    [0.5, 0.5, 0.5]
     """
     scratch = tempfile.TemporaryDirectory(prefix="skinfit-") if folder is None else None
     place = Path(scratch.name if scratch is not None else str(folder))
@@ -220,7 +258,13 @@ def load_dict(
 
 def demo(folder: FilePath | None = None, *, effects: Sequence[str] | None = None, cache: Cache = True) -> Scene:
     """The built-in scene: a head that skinfit makes, whose targets its own model has drawn. Its files are kept below
-    `folder`, by default the cache."""
+    `folder`, by default the cache.
+
+    >>> import skinfit
+    >>> scene = skinfit.demo()
+    >>> scene.params["rim_exponent"]
+    2.0
+    """
     kept = _cache(cache)
     scratch = None
     if folder is None and kept is None:

@@ -12,7 +12,16 @@ Row = dict[str, Any]
 
 
 class Table(Sequence[Row]):
-    """Rows with the same keys. `repr` shows them below one another; a notebook shows a table."""
+    """Rows with the same keys. `repr` shows them below one another; a notebook shows a table.
+
+    >>> table = Table([{"view": "front", "psnr": 31.25}, {"view": "profile", "psnr": None}])
+    >>> table
+    view     psnr
+    front    31.25
+    profile
+    >>> table.column("view")
+    ['front', 'profile']
+    """
 
     def __init__(self, rows: Iterable[Row]) -> None:
         self._rows = list(rows)

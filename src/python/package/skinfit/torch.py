@@ -77,12 +77,13 @@ class _Loss(torch.autograd.Function):
 class _Image(torch.autograd.Function):
     @staticmethod
     def forward(
-        context: Any, objective: Any, view: str | None, names: list[str], *point: torch.Tensor | None
+        context: Any, objective: AnyObjective, view: str | None, names: list[str], *point: torch.Tensor | None
     ) -> torch.Tensor:
         context.objective, context.view, context.names = objective, view, names
         # PyTorch tells where they are changed before the backward pass.
         context.save_for_backward(*point)
-        return _tensor(objective.image(*_arguments(objective, names, point), view), _like(point))
+        arguments = [*_arguments(objective, names, point), view]
+        return _tensor(objective.image(*arguments), _like(point))
 
     @staticmethod
     @torch.autograd.function.once_differentiable

@@ -131,6 +131,7 @@ impl Fits {
             let options = FitOptions {
                 solver: *solver,
                 max_iterations: Some(MOST_ITERATIONS),
+                bounds: self.subject.scenes.bounds(),
                 ..FitOptions::default()
             };
             let outcome = fit::fit(&objective, &start, &options, &mut |_| {})

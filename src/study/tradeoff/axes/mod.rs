@@ -37,6 +37,7 @@ pub fn all() -> Vec<&'static dyn Axis> {
         &ways::LOBE,
         &ways::SPLIT_SUM,
         &ways::LOOKUP,
+        &ways::NORMALS,
         &ways::REFLECTION,
         &ways::BOUNCES,
         &diffusion::TAPS,

@@ -92,7 +92,8 @@ impl Remeshed {
     /// The scene with this mesh and these settings, sampled.
     pub(super) fn evaluated(&self, bench: &Bench<'_>, settings: Settings) -> Result<Evaluated, StudyError> {
         let mut scene = bench.scene(settings);
-        let PosedMesh { positions, normals, tangents, uvs, triangles, fields, plain } = self.mesh.clone();
+        let PosedMesh { positions, normals, tangents, uvs, triangles, fields, plain, rest: _ } =
+            self.mesh.clone();
         scene.mesh = Mesh { positions, normals, tangents, uvs, triangles, fields, plain, ..Mesh::default() };
         let occlusion = self.open.clone().map(|base| VertexOcclusion { base, morphs: Vec::new() });
         let bakes = SurfaceBakes { occlusion: occlusion.as_ref(), ..SurfaceBakes::default() };

@@ -3,15 +3,18 @@
 use std::sync::Arc;
 
 use crate::StudyError;
-use crate::model::choices::{Bounces, LobeLookup, SkinReflection, SpecularVisibility, SplitSum, Visibility};
+use crate::model::choices::{
+    Bounces, LobeLookup, NormalFilter, SkinReflection, SpecularVisibility, SplitSum, Visibility,
+};
 use crate::model::effects::Effect;
+use crate::model::texture_filter::TextureFilter;
 use crate::reference::Difference;
 use crate::scene::Scene;
 use crate::tradeoff::axis::{Rates, SceneAxis, Setting, Sweep, mark_pareto};
 use crate::tradeoff::bench::{Bench, TimedImages};
 
-/// A way, by its name in scene files, and what it changes of a scene: choices, effects, `[diffusion]`, parameters, no more
-/// (`Bench::reference`).
+/// A way, by its name in scene files, and what it changes of a scene: choices, effects, `[quality]`, `[diffusion]`,
+/// parameters, no more (`Bench::reference`).
 pub(super) type Way = (&'static str, fn(&mut Scene));
 
 /// The ways to a quantity. The last one is the reference.
@@ -90,6 +93,35 @@ pub(super) const LOOKUP: Ways = Ways {
     ],
 };
 
+/// Bumps that are smaller than what a sample covers.
+pub(super) const NORMALS: Ways = Ways {
+    axis: "normal_filter",
+    title: "Bumps that are smaller than a sample",
+    method: "Images with mean normals alone, and with specular lobes widened by how far the normals below a sample are apart, both \
+             of filtered maps; the reference has many samples a pixel, each of the finest texels. Errors hold what more samples change \
+             beside bumps, at outlines, the same for every way. Seconds are those of baking, tracing and one pass, nothing cached.",
+    effect: "light_specular",
+    idle: "the effect light_specular is off, whose highlights bumps widen",
+    ways: &[
+        ("trilinear, none", |scene| filtered(scene, TextureFilter::Trilinear, NormalFilter::None)),
+        ("trilinear, toksvig", |scene| filtered(scene, TextureFilter::Trilinear, NormalFilter::Toksvig)),
+        ("anisotropic, none", |scene| filtered(scene, TextureFilter::Anisotropic, NormalFilter::None)),
+        ("anisotropic, toksvig", |scene| filtered(scene, TextureFilter::Anisotropic, NormalFilter::Toksvig)),
+        ("bilinear, many samples", |scene| {
+            filtered(scene, TextureFilter::Bilinear, NormalFilter::None);
+            scene.quality.samples_per_axis = scene.quality.samples_per_axis.max(MANY);
+        }),
+    ],
+};
+
+/// Samples along a pixel's side of the reference, at the least, as of `texture_filter`.
+const MANY: u32 = 8;
+
+fn filtered(scene: &mut Scene, textures: TextureFilter, normals: NormalFilter) {
+    scene.quality.texture_filter = textures;
+    scene.choices.normal_filter = normals;
+}
+
 /// Light that the skin throws back at itself.
 pub(super) const BOUNCES: Ways = Ways {
     axis: "bounces",
@@ -144,8 +176,8 @@ impl SceneAxis for Ways {
         for (i, &(name, way)) in self.ways.iter().enumerate() {
             let mut scene = Scene::clone(own);
             way(&mut scene);
-            let kept = (scene.choices, scene.diffusion, scene.effects);
-            let present = kept == (own.choices, own.diffusion, own.effects);
+            let kept = (scene.choices, scene.diffusion, scene.effects, scene.quality);
+            let present = kept == (own.choices, own.diffusion, own.effects, own.quality);
             let made = if i == last { bench.reference(scene)? } else { Arc::new(bench.way(scene)?) };
             found.push((name, present, made));
         }

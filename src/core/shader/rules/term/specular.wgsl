@@ -15,15 +15,82 @@
 // sample_field: lobe_wide: vec3f = 0; the same at the greatest
 // sample_field: lobe_nodes: vec3f = 0; these roughnesses
 // sample_field: skin_seen: vec3f = 0; mean radiance of the skin that a point sees, before the diffuse weights
+// sample_field: normal_spread: f32 = 0; variance of the normal map's slopes below a sample, along each axis
 // sample_field: bent_normal: vec3f = 0; mean direction of the open sky, as long as its share of the hemisphere
 
 // m, the roughness that every formula takes.
 //
 // gives: lobe_roughness
+// when: !toksvig
 // cost: 4
 // uses: specular
 fn roughness_of_texel(roughness: f32, gloss: f32, specular: f32) -> f32 {
     return specular_roughness(roughness, gloss, specular);
+}
+
+// The listing's normal map is no map of directions.
+//
+// gives: lobe_roughness
+// when: toksvig, listing
+// cost: 4
+// uses: specular
+fn roughness_of_listed_texel(roughness: f32, gloss: f32, specular: f32) -> f32 {
+    return specular_roughness(roughness, gloss, specular);
+}
+
+// With the bumps below the sample: the slopes' variances add, and m^2 is that of both axes.
+//
+// gives: lobe_roughness
+// when: toksvig, corrected, kelemen
+// cost: 12
+// uses: specular
+fn roughness_over_bumps(roughness: f32, gloss: f32, specular: f32, bump_spread: f32, normal_strength: f32) -> f32 {
+    let m: f32 = specular_roughness(roughness, gloss, specular);
+    return min(sqrt(m * m + 2.0 * bump_spread * (normal_strength * normal_strength)), 1.0);
+}
+
+// The same of ggx, by its alpha = m^2.
+//
+// gives: lobe_roughness
+// when: toksvig, corrected, ggx
+// cost: 20
+// uses: specular
+fn roughness_over_bumps_of_ggx(
+    roughness: f32,
+    gloss: f32,
+    specular: f32,
+    bump_spread: f32,
+    normal_strength: f32,
+) -> f32 {
+    let m: f32 = specular_roughness(roughness, gloss, specular);
+    let alpha: f32 = m * m;
+    return min(sqrt(sqrt(alpha * alpha + 2.0 * bump_spread * (normal_strength * normal_strength))), 1.0);
+}
+
+// As the sample has it.
+//
+// gives: bump_spread
+// when: toksvig, corrected, !raster
+// cost: 0
+fn spread_of_sample(normal_spread: f32) -> f32 {
+    return normal_spread;
+}
+
+// The mean of unit normals is as long as 1 / (1 + the variance of their slopes) (Toksvig 2005).
+//
+// gives: bump_spread
+// when: toksvig, corrected, raster, bumped
+// cost: 10
+fn spread_of_texel(decoded: vec3f) -> f32 {
+    let size: f32 = clamp(sqrt(dot(decoded, decoded)), 0.1, 1.0);
+    return (1.0 - size) / size;
+}
+
+// gives: bump_spread
+// when: toksvig, corrected, raster, !bumped
+// cost: 0
+fn spread_without_bumps() -> f32 {
+    return 0.0;
 }
 
 // gives: lobe_f0

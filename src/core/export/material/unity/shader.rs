@@ -1,7 +1,11 @@
-//! A material of Unity: a ShaderLab file.
+//! The shader of a material: a ShaderLab file.
+//!
+//! Its properties are the cubes and maps, and the constants: a project's materials share one shader, and each has values of
+//! its own. In the include stand the same values, for shaders that declare nothing.
 
-use super::{Bound, Members, Parts};
+use super::Tuned;
 use crate::export::ExportError;
+use crate::export::material::{Bound, Members, Parts};
 
 /// Unity's X is glTF's, mirrored; the vertex stage has turned it back.
 const MEMBERS: Members = [
@@ -14,27 +18,65 @@ const MEMBERS: Members = [
     ("eye", "turned(_WorldSpaceCameraPos)"),
 ];
 
-/// A ShaderLab file (Unity's manual, "ShaderLab"): unlit, for the built-in pipeline and URP.
-pub(super) fn text(parts: &Parts<'_>) -> Result<String, ExportError> {
+/// A ShaderLab file (Unity's manual, "ShaderLab"): unlit, for the built-in pipeline and URP. `title` is its name in Unity's
+/// list of shaders.
+pub(in crate::export::material) fn text(parts: &Parts<'_>, title: &str) -> Result<String, ExportError> {
     let property = |Bound { name, cube, words, .. }: Bound| {
         let (kind, neutral) = if cube { ("Cube", "black") } else { ("2D", "white") };
         let words = words.replace('"', "'");
         format!("        [NoScaleOffset] {name} (\"{words}\", {kind}) = \"{neutral}\" {{}}\n")
     };
-    let properties: String = parts.bound().map(property).collect();
+    let tuned = super::tuned(parts);
+    let properties: String = parts.bound().map(property).chain(tuned.iter().map(of_constant)).collect();
     let filled = parts.filled(&MEMBERS, "                ")?;
     Ok(SHADER
-        .replace("PROPERTIES\n", &properties)
-        .replace("FILLED\n", &filled)
-        .replace("SHADER", &parts.shader.replace('"', "")))
+        // Names first: what they are replaced by has none of the marks below.
+        .replace("@TITLE@", &title.replace(['"', '/', '\\', '@'], ""))
+        .replace("@INCLUDE@", &parts.shader.replace(['"', '@'], ""))
+        .replace("@PROPERTIES@\n", &properties)
+        .replace("@BUFFER@\n", &buffer(&tuned))
+        .replace("@FILLED@\n", &filled))
+}
+
+/// A constant as a property. A *Vector* has its numbers as they are; a *Color* would be decoded from sRGB.
+fn of_constant(constant: &Tuned) -> String {
+    let Tuned { property, words, .. } = constant;
+    let words = words.replace('"', "'");
+    match constant.four() {
+        None => format!("        {property} (\"{words}\", Float) = {}\n", constant.value[0]),
+        Some([x, y, z, w]) => format!("        {property} (\"{words}\", Vector) = ({x}, {y}, {z}, {w})\n"),
+    }
+}
+
+/// The constants as the shader's stages read them: properties are numbers or have four of them (Unity's manual, "Add material
+/// properties"), and the batcher of scriptable pipelines wants them in a buffer of this name ("Scriptable Render Pipeline
+/// Batcher").
+fn buffer(tuned: &[Tuned]) -> String {
+    let line = |text: &str| format!("            {text}\n");
+    if tuned.is_empty() {
+        return String::new();
+    }
+    let mut text = line("// The material's constants, in place of the include's own.");
+    text += &line("CBUFFER_START(UnityPerMaterial)");
+    for constant in tuned {
+        let kind = if constant.four().is_some() { "float4" } else { "float" };
+        text += &line(&format!("    {kind} {};", constant.property));
+    }
+    text += &line("CBUFFER_END");
+    text += &line("#define SKINFIT_MATERIAL");
+    for Tuned { property, name, value, .. } in tuned {
+        let part = ["", "", ".xy", ".xyz"].get(value.len()).unwrap_or(&"");
+        text += &line(&format!("#define {name} {property}{part}"));
+    }
+    text
 }
 
 const SHADER: &str = r#"// Linear radiance: the player's colour space is Linear. Maps other than the colour map, and all cubes, are imported with
 // sRGB off; the normal map as an ordinary texture, as it is read as stored. Occlusion is the first number of the second
 // texture coordinates.
-Shader "Skinfit/Skin" {
+Shader "Skinfit/@TITLE@" {
     Properties {
-PROPERTIES
+@PROPERTIES@
     }
     SubShader {
         Tags { "RenderType" = "Opaque" "Queue" = "Geometry" }
@@ -44,7 +86,8 @@ PROPERTIES
             #pragma vertex skin_vertex
             #pragma fragment skin_fragment
             #include "UnityCG.cginc"
-            #include "SHADER"
+@BUFFER@
+            #include "@INCLUDE@"
 
             struct OfMesh {
                 float4 position : POSITION;
@@ -85,7 +128,7 @@ PROPERTIES
 
             float4 skin_fragment(Between from) : SV_Target {
                 SkinfitSurface at;
-FILLED
+@FILLED@
                 return skinfit_shade(at);
             }
             ENDHLSL

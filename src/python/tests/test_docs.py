@@ -1,0 +1,43 @@
+"""The examples of docstrings and of docs/python.md run; PyTorch's do in `test_torch.py`."""
+
+import doctest
+import importlib
+import pkgutil
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+import skinfit
+
+DOCS = Path(__file__).resolve().parents[3] / "docs/python.md"
+MODULES = sorted(module.name for module in pkgutil.iter_modules(skinfit.__path__) if not module.name.startswith("_"))
+
+
+@pytest.mark.parametrize("name", ["", *(name for name in MODULES if name != "torch")])
+def test_the_examples_of_docstrings_run(name: str, cache: Path, unwarned: None) -> None:
+    run_docstrings(f"skinfit.{name}" if name else "skinfit")
+
+
+def run_docstrings(module: str) -> None:
+    flags = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+    failed, _ = doctest.testmod(importlib.import_module(module), optionflags=flags)
+    assert failed == 0
+
+
+def run_blocks(torch: bool) -> int:
+    """Run the page's examples, from the first to the last, that use PyTorch or do not: how many there are."""
+    found = re.findall(r"^```python\n(.*?)^```$", DOCS.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+    blocks = [block for block in found if ("torch" in block) == torch]
+    there: dict[str, object] = {}
+    for number, block in enumerate(blocks):
+        exec(compile(block, f"{DOCS.name}, block {number + 1}", "exec"), there)
+    return len(blocks)
+
+
+def test_the_examples_of_the_page_run_from_the_first_to_the_last(
+    small_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unwarned: None
+) -> None:
+    shutil.copytree(small_file.parent, tmp_path / "here")
+    monkeypatch.chdir(tmp_path / "here")
+    assert run_blocks(torch=False) >= 2
