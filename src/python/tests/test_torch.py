@@ -101,26 +101,26 @@ def test_images_have_their_slopes_along_maps(of_maps: skinfit.MapObjective) -> N
     for name in start:
         tensor = start[name].clone().requires_grad_()
         weighed({**start, name: tensor}).backward()
-        along = 0.5 * start[name].mean() * torch.randn(tensor.shape, generator=generator)
-        pair = [weighed({**start, name: start[name] + sign * along}) for sign in (1, -1)]
-        # Roundings of the image, 6e-8 each and independent.
-        size = tensor.grad.norm() * along.norm()
-        assert abs((pair[0] - pair[1]) / 2 - (tensor.grad * along).sum()) < 1e-4 * size, name
+        # To where it grows: nothing cancels. The image is linear in each map.
+        along = start[name].mean() * torch.rand(tensor.shape, generator=generator) * tensor.grad.sign()
+        after, before = (weighed({**start, name: start[name] + sign * along}) for sign in (1, -1))
+        product = (tensor.grad * along).sum(dtype=torch.float64)
+        assert ((after - before) / 2).item() == pytest.approx(product.item(), rel=1e-5), name
 
 
 def test_maps_that_a_network_makes_are_fitted(of_maps: skinfit.MapObjective) -> None:
-    # One factor on the colour map, in steps that do not leap over the least loss.
+    # One factor on the colour map, which is too bright for the constants of the start.
     color = torch.from_dlpack(of_maps.maps["color"])
-    factor = torch.tensor(0.7, requires_grad=True)
-    optimiser = torch.optim.Adam([factor], lr=0.005)
+    factor = torch.tensor(1.0, requires_grad=True)
+    optimiser = torch.optim.Adam([factor], lr=0.05)
     losses = []
-    for _ in range(5):
+    for _ in range(3):
         optimiser.zero_grad()
         value = skinfit.torch.loss(of_maps, maps={"color": factor * color})
         value.backward()
         optimiser.step()
         losses.append(value.item())
-    assert losses == sorted(losses, reverse=True) and factor.item() > 0.72
+    assert losses[0] > losses[1] > losses[2] and factor.item() < 0.9
 
 
 def test_maps_are_of_functions_of_maps(objective: skinfit.Objective) -> None:

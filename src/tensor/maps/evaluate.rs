@@ -11,6 +11,7 @@ use super::pixels::Part;
 use super::problem::read;
 use crate::bake::LobeStack;
 use crate::engine::{Point, Unknown};
+use crate::model::cube::Cube;
 use crate::model::gain::Gain;
 use crate::model::params::{Column, Param};
 use crate::{Inputs, SharedDevice, TensorError};
@@ -29,8 +30,8 @@ pub(super) struct Variables {
 pub(super) struct Evaluation<'a> {
     of: &'a Variables,
     tensors: Tensors,
-    /// How the specular cube moves with its exponent.
-    lobe_slope: Option<Tensor<2>>,
+    /// How the specular cube moves with its exponent, where that is free.
+    lobe_slope: Option<Cube<f32>>,
     /// Of each view.
     gains: Vec<Gain>,
     columns: Option<Tensor<1>>,
@@ -70,17 +71,16 @@ impl Variables {
         });
         let texels = texels.collect::<Result<_, MapError>>()?;
         let exponent = point.params.scalar(Param::SpecularLobe);
-        let cubes = self.lobes.as_ref().map(|stack| stack.at(exponent));
-        let cube = |cube| cube_tensor(&self.shared, cube);
+        let (lobe, lobe_slope) = self.lobes.as_ref().map(|stack| stack.at(exponent)).unzip();
         let tensors = Tensors {
             columns: column_tensor(&self.shared, &self.columns, point),
-            lobe: cubes.as_ref().map(|(light, _)| cube(light)),
+            lobe: lobe.map(|cube| cube_tensor(&self.shared, &cube)),
             texels,
         };
         Ok(Evaluation {
             of: self,
             tensors,
-            lobe_slope: cubes.as_ref().map(|(_, slope)| cube(slope)),
+            lobe_slope,
             gains: (0..views).map(|view| point.gains.get(view).copied().unwrap_or_default()).collect(),
             columns: None,
             lobe: None,
@@ -154,7 +154,11 @@ impl Evaluation<'_> {
         let Self { of, lobe_slope, columns, lobe, texels, by_gain, .. } = self;
         let columns = columns.map_or(Ok(Vec::new()), read)?;
         let exponent = match (lobe, lobe_slope) {
-            (Some(lobe), Some(slope)) => f64::from(read((lobe * slope).sum())?[0]),
+            // Not burn's sum, which adds in the order in which threads come.
+            (Some(lobe), Some(slope)) => {
+                let pairs = read(lobe)?.into_iter().zip(slope.padded().as_flattened());
+                pairs.map(|(a, &b)| f64::from(a) * f64::from(b)).sum()
+            }
             _ => 0.0,
         };
         let by_column = |column: &Column| {
