@@ -20,7 +20,7 @@ use super::sky_lights::sky_lights;
 use super::terms::terms;
 use super::view::{Background, View};
 use super::{FitSettings, Scene, images, transmission};
-use crate::model::choices::{Choices, SpecularVisibility};
+use crate::model::choices::{Choices, NormalFilter, SpecularVisibility};
 use crate::model::dapple::Dapple;
 use crate::model::effects::{Effect, Effects};
 use crate::model::evaluate::Setup;
@@ -136,6 +136,9 @@ impl Scene {
             maps.color = maps.color.or(color);
             maps.normal = maps.normal.or(normal);
             uv = of_material.uv();
+        }
+        if choices.normal_filter == NormalFilter::Toksvig {
+            maps.normalise_normals();
         }
         bar.inc(1);
         let ask = Ask { clip: options.clip, uv, ..ask(&maps, form, effects, needs, &pose) };

@@ -1,5 +1,8 @@
 //! Texture maps and the panorama, as linear numbers.
 
+use glam::DVec3;
+use rayon::prelude::*;
+
 use crate::model::fields::Field;
 
 /// An image of `C` linear channels, row by row from the top.
@@ -90,6 +93,18 @@ impl Maps {
         }
     }
 
+    /// Have every texel of the normal map a unit normal, so that only what lies between texels shortens a mean of them.
+    /// The direction stays; a texel without one stays as it is.
+    pub fn normalise_normals(&mut self) {
+        let Some(map) = &mut self.normal else { return };
+        map.texels.par_iter_mut().for_each(|texel| {
+            let normal = DVec3::from(texel.map(|x| 2.0 * f64::from(x) - 1.0));
+            if let Some(unit) = normal.try_normalize() {
+                *texel = unit.to_array().map(|x| (0.5 * x + 0.5) as f32);
+            }
+        });
+    }
+
     fn of(&self, field: Field) -> Option<&OwnMap> {
         self.own.iter().find(|(of, _)| *of == field).map(|(_, map)| map)
     }
@@ -130,4 +145,26 @@ pub fn luminance(rgb: [f32; 3]) -> f32 {
     let [r, g, b] = rgb.map(f64::from);
     // In f64 and with weights that sum to exactly 1, so that grey 1 has luminance 1.
     (0.2126 * r + 0.7152 * g + 0.0722 * b) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn normals_become_units_along_their_direction_where_they_have_one() {
+        let encoded = |normal: [f32; 3]| normal.map(|x| 0.5 * x + 0.5);
+        let texels = vec![encoded([0.3, 0.0, 0.4]), [0.5; 3], [f32::NAN; 3], encoded([0.0, 0.0, 1.0])];
+        let mut maps =
+            Maps { normal: Some(Map { width: 2, height: 2, texels: texels.clone() }), ..Maps::default() };
+        maps.normalise_normals();
+        let made = maps.normal.unwrap().texels;
+        let off =
+            made[0].iter().zip(encoded([0.6, 0.0, 0.8])).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        // Roundings of f32.
+        assert!(off < 1e-6, "{:?}", made[0]);
+        assert_eq!([made[1], made[3]], [texels[1], texels[3]]);
+        assert!(made[2].iter().all(|x| x.is_nan()));
+        Maps::default().normalise_normals();
+    }
 }

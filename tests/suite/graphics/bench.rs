@@ -157,6 +157,17 @@ impl Difference {
     }
 }
 
+/// The root mean square of how far wholly covered pixels are off, relative to their mean.
+pub(crate) fn error(reference: &Image, image: &Image) -> f64 {
+    let whole = |i: &usize| reference.alpha[*i] == 1.0 && image.alpha[*i] == 1.0;
+    let pixels: Vec<usize> = (0..reference.rgb.len()).filter(whole).collect();
+    assert!(pixels.len() > 500, "{}", pixels.len());
+    let of = |image: &Image, i: usize| f64::from(image.rgb[i][1]);
+    let square: f64 = pixels.iter().map(|&i| (of(image, i) - of(reference, i)).powi(2)).sum();
+    let mean = pixels.iter().map(|&i| of(reference, i)).sum::<f64>() / pixels.len() as f64;
+    (square / pixels.len() as f64).sqrt() / mean
+}
+
 /// The error that a share of the pixels stays below.
 pub(crate) fn quantile(sorted: &[f32], share: f64) -> f32 {
     let at = ((sorted.len() as f64 * share) as usize).min(sorted.len().saturating_sub(1));

@@ -51,17 +51,6 @@ fn with(baked: &Baked, filter: TextureFilter) -> Baked {
     baked.clone().with_scene(|scene| scene.quality.texture_filter = filter)
 }
 
-/// The root mean square of how far wholly covered pixels are off, relative to their mean.
-fn error(reference: &Image, image: &Image) -> f64 {
-    let whole = |i: &usize| reference.alpha[*i] == 1.0 && image.alpha[*i] == 1.0;
-    let pixels: Vec<usize> = (0..reference.rgb.len()).filter(whole).collect();
-    assert!(pixels.len() > 500, "{}", pixels.len());
-    let of = |image: &Image, i: usize| f64::from(image.rgb[i][1]);
-    let square: f64 = pixels.iter().map(|&i| (of(image, i) - of(reference, i)).powi(2)).sum();
-    let mean = pixels.iter().map(|&i| of(reference, i)).sum::<f64>() / pixels.len() as f64;
-    (square / pixels.len() as f64).sqrt() / mean
-}
-
 #[test]
 fn one_filtered_sample_shows_what_many_show() {
     let baked = checkerboard();

@@ -120,6 +120,10 @@ const MANY: u32 = 8;
 fn filtered(scene: &mut Scene, textures: TextureFilter, normals: NormalFilter) {
     scene.quality.texture_filter = textures;
     scene.choices.normal_filter = normals;
+    if normals == NormalFilter::Toksvig {
+        // As a scene file that says so has them.
+        scene.maps.normalise_normals();
+    }
 }
 
 /// Light that the skin throws back at itself.
