@@ -101,7 +101,7 @@ fn list(scene: &Scene) -> String {
 fn bounds(scene: &Scene) -> String {
     let own = scene.fit.bounds.iter().filter(|(param, _)| !param.is_of_scene());
     let all: Vec<String> = own.map(|(param, [a, b])| format!("{} in [{a}, {b}]", param.name())).collect();
-    all.join(", ")
+    if all.is_empty() { "the table's".to_owned() } else { all.join(", ") }
 }
 
 fn value(rgb: [f64; 3]) -> String {

@@ -48,7 +48,32 @@ def test_the_image_has_its_gradient(objective: skinfit.Objective, x: Vector) -> 
     weights = np.random.default_rng(2).normal(size=drawn.shape)
     assert np.array_equal(backward(jnp.array(weights))[0], objective.vjp(x, weights, "side"))
     # Differences of float64 by JAX's step for it; the image is smooth in what is free here.
-    check_grads(jax.jit(image), (jnp.array(x),), order=1, modes=["rev"])
+    check_grads(jax.jit(image), (jnp.array(x),), order=1, modes=["fwd", "rev"])
+    along = np.random.default_rng(3).normal(size=x.shape)
+    _, moved = jax.jit(lambda y, dy: jax.jvp(image, (y,), (dy,)))(jnp.array(x), jnp.array(along))
+    assert np.array_equal(moved, objective.jvp(x, along, "side"))
+
+
+def test_a_jacobian_is_the_same_by_either_mode(objective: skinfit.Objective, x: Vector) -> None:
+    image = skinfit.jax.image(objective, "side")
+
+    def patch(y: jax.Array) -> jax.Array:
+        return image(y)[20:22, 24:26]
+
+    forward, reverse = jax.jacfwd(patch)(jnp.array(x)), jax.jit(jax.jacrev(patch))(jnp.array(x))
+    assert forward.shape == (2, 2, 3, x.size) and np.abs(forward).max() > 1e-3
+    # Sums over few samples in another order.
+    assert np.allclose(forward, reverse, rtol=1e-12, atol=1e-15)
+    slope = jax.jvp(skinfit.jax.loss(objective), (jnp.array(x),), (jnp.ones(x.size),))[1]
+    assert np.isclose(slope, objective.gradient(x).sum(), rtol=1e-13)
+
+
+def test_a_second_derivative_is_refused(objective: skinfit.Objective, x: Vector) -> None:
+    image = skinfit.jax.image(objective, "side")
+    with pytest.raises(TypeError, match="first derivatives alone"):
+        jax.hessian(lambda y: image(y).sum())(jnp.array(x))
+    with pytest.raises(ValueError, match="JVP"):
+        jax.hessian(skinfit.jax.loss(objective))(jnp.array(x))
 
 
 def test_it_answers_in_the_kind_that_it_is_asked_in(objective: skinfit.Objective, x: Vector) -> None:

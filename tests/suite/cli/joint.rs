@@ -106,6 +106,40 @@ fn two_lights_find_one_skin_and_each_its_own_light() {
 }
 
 #[test]
+fn bounds_of_the_skin_hold_in_all_scenes_and_those_of_a_light_in_its_own() {
+    let sandbox = lit();
+    // The truth is a hilite of 0.5; of 20 and -35 degrees.
+    let bounded = |scene: &str, to: &str, bounds: &str| {
+        let text = sandbox.text(scene);
+        sandbox.write(to, text.replace("[fit]\n", &format!("[fit]\nbounds = {{ {bounds} }}\n")).as_bytes());
+    };
+    let skin = "hilite = [0.1, 0.4]";
+    bounded("noon.toml", "noon_within.toml", &format!("{skin}, environment_rotation = [-10.0, 16.0]"));
+    bounded("night.toml", "night_within.toml", skin);
+    sandbox.write("start.toml", b"[params]\nhilite = 0.3\n");
+    let scenes = ["noon_within.toml", "night_within.toml"];
+    let rest = ["--params", "start.toml", "-o", "run", "--engine", "cpu"];
+    sandbox.run(&[&["fit"], &scenes[..], &rest].concat()).done();
+    let params = sandbox.json("run/report.json")["params"].clone();
+    let at = |name: &str| (params[name]["value"].as_f64().unwrap(), params[name]["at_bound"] == true);
+    assert_eq!(at("hilite"), (0.4, true));
+    assert_eq!(at("noon_within/environment_rotation"), (16.0, true));
+    let (night, held) = at("night_within/environment_rotation");
+    // What is wrong with the others moves it, but no bound of another scene's light holds it.
+    assert!(!held && (night + 35.0).abs() < 5.0, "{night}");
+    let kept: toml::Table = sandbox.text("run/scenes/noon_within.toml").parse().unwrap();
+    assert_eq!(kept["fit"]["bounds"]["hilite"].as_array().unwrap()[1].as_float(), Some(0.4));
+    // One skin has one interval.
+    sandbox
+        .run(&["fit", "noon_within.toml", "night.toml", "-o", "none"])
+        .refused(&["its bounds of what is the skin's", "(the table's; there hilite in [0.1, 0.4])"]);
+    // A start out of them is refused as one out of the table's is.
+    let out = ["fit", "noon_within.toml", "night_within.toml", "-o", "none"];
+    sandbox.run(&out).refused(&["the start value of hilite is 0.7, outside its bounds 0.1 to 0.4"]);
+    assert!(!sandbox.path("none").exists());
+}
+
+#[test]
 fn constants_of_a_joint_fit_are_used_with_one_scene() {
     let sandbox = lit();
     sandbox.run(&["fit", "noon.toml", "night.toml", "-o", "run"]).done();

@@ -6,7 +6,6 @@ use skinfit::gpu::{Gpu, RenderOptions};
 use skinfit::model::texture_filter::TextureFilter;
 use skinfit::prepare::{Baked, PrepareOptions};
 use skinfit::render::antialias::Antialias;
-use skinfit::render::image::Image;
 use skinfit::samples::{LANES, ViewSamples};
 use skinfit::scene::maps::{Map, Maps};
 use skinfit::shader::Budget;

@@ -6,7 +6,7 @@ use egui_kittest::kittest::Queryable as _;
 use skinfit_view::egui::{Key, Modifiers};
 use skinfit_view::paint::Slot;
 
-use super::{click, drag, left_out, node, open, settle, start, value};
+use super::{click, drag, left_out, node, open, settle, start, until, value};
 use crate::model::params::Param;
 
 #[test]
@@ -87,4 +87,34 @@ fn an_effect_is_switched_and_what_it_brought_is_told() {
     settle(&mut hand);
     node(&hand, "fit reflection");
     assert_eq!(hand.state().session.opened().unwrap().baked.scene.effects, before);
+}
+
+#[test]
+fn sliders_and_fits_stay_within_the_scenes_bounds() {
+    if left_out() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let mut start = start(folder.path());
+    let reading = &mut start.scenes[0];
+    let text = std::fs::read_to_string(&reading.scene).unwrap();
+    // It is 1 there at the start, and 0.85 in what the targets were made with.
+    let bounded = text.replacen("[fit]\n", "[fit]\nbounds = { base_weight = [0.9, 1.05] }\n", 1);
+    assert_ne!(text, bounded, "{text}");
+    let name = format!("bounded-{}.toml", folder.path().file_name().unwrap().to_string_lossy());
+    reading.scene = reading.scene.with_file_name(name);
+    std::fs::write(&reading.scene, bounded).unwrap();
+    let mut hand = open(&start);
+    for (far, end) in [(4000.0, 1.05), (-4000.0, 0.9)] {
+        drag(&mut hand, "base_weight", &[5.0, far]);
+        assert_eq!(value(&hand, Param::BaseWeight), [end; 3]);
+    }
+    click(&mut hand, "undo");
+    click(&mut hand, "undo");
+    click(&mut hand, "fit");
+    until(&mut hand, "the fit ends", |window| window.session.found().is_some());
+    settle(&mut hand);
+    assert_eq!(value(&hand, Param::BaseWeight), [0.9; 3]);
+    let found = hand.state().session.found().unwrap();
+    assert!(found.constant("base_weight").unwrap().at_bound);
 }
