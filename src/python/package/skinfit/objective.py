@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _native
-from .errors import ArrayError
+from .errors import ArrayError, ParamError
+from .given import Number, numbers
 
 Vector = NDArray[np.float64]
-Number = TypeVar("Number", np.float32, np.float64)
 
 
 @dataclass(frozen=True)
@@ -36,8 +35,9 @@ class NormalEquations:
 class Objective:
     """The loss of a scene over its free constants, at the values that it had when this was made.
 
-    `x` below is an array of (K,) float64, a number for each of `names`, within `bounds`: outside of them, and where it is
-    not finite, `ParamError` is raised; of another length, `ArrayError`. Angles are in degrees, as in scene files.
+    `x` below is an array of (K,) float64, a number for each of `names`, in the unit of its parameter (`ParamInfo.unit`;
+    angles in degrees, gains without), within `bounds`: outside of them, and where it is not finite or no number,
+    `ParamError` is raised; of another length, `ArrayError`.
 
     Loss, gradient and normal equations are those of the CPU engine, by the numbers of which `Scene.fit` goes. Images and
     products of their Jacobian are computed in float64.
@@ -77,15 +77,16 @@ class Objective:
         return self._native.bounds
 
     def loss(self, x: ArrayLike) -> float:
-        """The loss."""
+        """The scene's loss (`Scene.loss`) at `x`: the mean over weighted residuals, without priors. Of `l2` and `huber` in squared
+        linear radiance, of `relative_l2` and `smape` without a unit."""
         return self._native.loss(vector(x))
 
     def gradient(self, x: ArrayLike) -> Vector:
-        """(K,): the loss' gradient."""
+        """(K,): the loss' gradient, the loss per unit of each constant."""
         return self.loss_and_gradient(x)[1]
 
     def loss_and_gradient(self, x: ArrayLike) -> tuple[float, Vector]:
-        """The loss and its gradient (K,), in one pass: `scipy.optimize.minimize(f.loss_and_gradient, f.start, jac=True)`."""
+        """The loss and its gradient (K,), per unit of each constant, in one pass: `scipy.optimize.minimize(f.loss_and_gradient, f.start, jac=True)`."""
         return self._native.loss_and_gradient(vector(x))
 
     def normal_equations(self, x: ArrayLike) -> NormalEquations:
@@ -98,11 +99,13 @@ class Objective:
         return self._native.image(vector(x), view)
 
     def jvp(self, x: ArrayLike, v: ArrayLike, view: str | None = None) -> Vector:
-        """(height, width, 3): how `image` moves as `x` moves along `v` (K,), the Jacobian times `v`."""
+        """(height, width, 3): how `image` moves as `x` moves along `v` (K,), the Jacobian times `v`: linear radiance where `v` is
+        in the constants' units."""
         return self._native.jvp(vector(x), vector(v), view)
 
     def vjp(self, x: ArrayLike, image: ArrayLike, view: str | None = None) -> Vector:
-        """(K,): `image` (height, width, 3) times the Jacobian of `Objective.image`: the gradient of their inner product."""
+        """(K,): `image` (height, width, 3) times the Jacobian of `Objective.image`: the gradient of their inner product, the
+        sum over pixels and channels, per unit of each constant."""
         return self._native.vjp(vector(x), image_array(image, np.float64), view)
 
     def __repr__(self) -> str:
@@ -111,15 +114,18 @@ class Objective:
 
 def vector(x: ArrayLike) -> Vector:
     """Constants, as the library takes them."""
-    array = np.asarray(x, dtype=np.float64)
+    remedy = "Give a number for each free constant."
+    # What is not finite is out of bounds, of which the library tells the constant.
+    array = numbers("x", x, np.float64, remedy, kinds="fiu", finite=False, refused=ParamError)
     if array.ndim != 1:
-        raise ArrayError(f"an array of shape {array.shape} is no vector. Give a number for each free constant.")
+        raise ArrayError(f"an array of shape {array.shape} is no vector. {remedy}")
     return array
 
 
 def image_array(image: ArrayLike, kind: type[Number]) -> NDArray[Number]:
     """An image, as the library takes it."""
-    array = np.asarray(image, dtype=kind)
+    remedy = "Give height x width x 3 numbers."
+    array = numbers("image", image, kind, remedy, kinds="fiu", finite=False)
     if array.ndim != 3:
-        raise ArrayError(f"an array of shape {array.shape} is no image. Give height x width x 3 numbers.")
+        raise ArrayError(f"an array of shape {array.shape} is no image. {remedy}")
     return array
