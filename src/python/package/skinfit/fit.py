@@ -28,7 +28,7 @@ from .page import Page
 from .page import write as write_page
 from .params import Value
 from .progress import Progress
-from .scratch import keep_run
+from .scratch import stays
 from .study import copy
 from .table import best
 
@@ -288,7 +288,7 @@ class FitSteps(Iterator[Step]):
         said, told = self._native.finish()
         _warn(told)
         if self._scratch is None:
-            keep_run(self._run)
+            stays(self._run)
         return Fit(self._run, self._scenes, "\n".join(said), self._scratch)
 
 

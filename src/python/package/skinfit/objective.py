@@ -77,8 +77,8 @@ class Objective:
         return self._native.bounds
 
     def loss(self, x: ArrayLike) -> float:
-        """The scene's loss (`Scene.loss`) at `x`: the mean over weighted residuals, without priors. Of `l2` and `huber` in squared
-        linear radiance, of `relative_l2` and `smape` without a unit."""
+        """The loss that `Scene.loss` names, at `x`: the mean over weighted residuals, without priors. Of `l2` and `huber` it
+        is in squared linear radiance, of `relative_l2` and `smape` dimensionless."""
         return self._native.loss(vector(x))
 
     def gradient(self, x: ArrayLike) -> Vector:
@@ -86,7 +86,8 @@ class Objective:
         return self.loss_and_gradient(x)[1]
 
     def loss_and_gradient(self, x: ArrayLike) -> tuple[float, Vector]:
-        """The loss and its gradient (K,), per unit of each constant, in one pass: `scipy.optimize.minimize(f.loss_and_gradient, f.start, jac=True)`."""
+        """The loss and its gradient (K,), per unit of each constant, in one pass:
+        `scipy.optimize.minimize(f.loss_and_gradient, f.start, jac=True)`."""
         return self._native.loss_and_gradient(vector(x))
 
     def normal_equations(self, x: ArrayLike) -> NormalEquations:
@@ -99,13 +100,13 @@ class Objective:
         return self._native.image(vector(x), view)
 
     def jvp(self, x: ArrayLike, v: ArrayLike, view: str | None = None) -> Vector:
-        """(height, width, 3): how `image` moves as `x` moves along `v` (K,), the Jacobian times `v`: linear radiance where `v` is
-        in the constants' units."""
+        """(height, width, 3): how `image` moves as `x` moves along `v` (K,), the Jacobian times `v`: in linear radiance, with
+        `v` in the units of `x`."""
         return self._native.jvp(vector(x), vector(v), view)
 
     def vjp(self, x: ArrayLike, image: ArrayLike, view: str | None = None) -> Vector:
-        """(K,): `image` (height, width, 3) times the Jacobian of `Objective.image`: the gradient of their inner product, the
-        sum over pixels and channels, per unit of each constant."""
+        """(K,): `image` (height, width, 3) times the Jacobian of `Objective.image`: the gradient of their inner product, a sum
+        over pixels and channels, per unit of each constant."""
         return self._native.vjp(vector(x), image_array(image, np.float64), view)
 
     def __repr__(self) -> str:

@@ -75,8 +75,8 @@ class Scene:
 
     def __reduce_ex__(self, protocol: object) -> NoReturn:
         raise TypeError(
-            "a scene is not pickled: it holds what the library has read. Pickle its path, or that of a file that it was saved "
-            "to, and load that: skinfit.load_file(path)."
+            "a scene is not pickled: it holds what the library has read. Pickle its path, or that of a file that it was "
+            "saved to, and load that: skinfit.load_file(path)."
         )
 
     @property
@@ -154,7 +154,8 @@ class Scene:
 
     def objective(self, hold_out: Names = ()) -> Objective:
         """The scene's fit as a function of what is free, at the values of now, over the views with a target that are not
-        held out (one name or several). Raises `SceneError` where no view has a target, `ViewError` for a name that is none."""
+        held out, by one name or several. Raises `SceneError` where no view has a target, `ViewError` for a name that is
+        none."""
         native = self._native.objective(names(hold_out, ViewError))
         self._warn_once(native.warnings)
         return Objective(native)
@@ -198,8 +199,8 @@ class Scene:
             return page.write([*words, *([] if title is None else [f"--title={title}"])], place, player, scratch)
 
     def save(self, file: FilePath) -> None:
-        """Write the scene with its values as a scene file whose paths are absolute. Files that go with the scene, as those of
-        arrays do, are copied into a folder beside it, `NAME_files`, and named from there. Raises `FileError`."""
+        """Write the scene with its values as a scene file whose paths are absolute. Files that go with the scene, as those
+        of arrays do, are copied into a folder beside it, `NAME_files`, and named from there. Raises `FileError`."""
         if self._folder is None:
             self._native.save(file)
             return

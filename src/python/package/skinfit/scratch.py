@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
 import filecmp
 import os
 import shutil
 import tempfile
 import uuid
 import weakref
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from .errors import SceneError
 
-# Those that are there now.
+# Those that are there now, and the run folders that may name files there.
 _FOLDERS: set[Path] = set()
+_RUNS: set[Path] = set()
 
 
 class Scratch:
@@ -30,6 +32,9 @@ class Scratch:
 def _remove(folder: Path, owner: int) -> None:
     # A process that was forked has no folders of its own.
     if os.getpid() == owner:
+        for run in sorted(_RUNS):
+            with contextlib.suppress(OSError):
+                keep_run(run, run, [folder])
         _FOLDERS.discard(folder)
         shutil.rmtree(folder, ignore_errors=True)
 
@@ -63,34 +68,57 @@ def place(beside: Path, folder: Path) -> None:
 def kept(text: str, folder: Path, files: str) -> str:
     """The text of a scene file for `folder`, where it can stand without the folders of this process: each file of these
     that it names is copied into the folder `files` there, and named from there."""
-    for source in _in_scratch(text):
+    for source in _named(text, _FOLDERS):
         copied = _copied(source, folder / files)
         text = _renamed(text, source, f"{files}/{copied.name}")
     return text
 
 
-def keep_run(run: Path, was: Path | None = None) -> None:
-    """Have the scenes of a run folder name what it needs from there: files of this process' folders are copied into it.
-    `was`: where the folder was copied from."""
+def stays(run: Path) -> None:
+    """Keep what a run folder needs. While the scene is there that was fitted, the fit can be gone on with only by the very
+    paths that it began with: files are copied, and named anew, when the scene's folder goes."""
+    _RUNS.add(run.absolute())
+
+
+def keep_run(run: Path, to: Path, folders: Iterable[Path] | None = None) -> None:
+    """Have the scenes of a run folder, which is to be renamed `to`, stand without these folders, by default those of this
+    process. Paths are absolute, as a fit is gone on with by those alone."""
+
+    def change(text: str, file: Path) -> str:
+        for source in _named(text, _FOLDERS if folders is None else folders):
+            copied = _copied(source, file.with_name(f"{file.stem}_files"))
+            text = _renamed(text, source, str(to.absolute() / copied.relative_to(run)))
+        return text
+
+    _change_scenes(run, change)
+
+
+def copy_run(run: Path, to: Path, beside: Path) -> None:
+    """Copy a run folder to `beside`, which is to be renamed `to`."""
+    whole = run.resolve()
+
+    def change(text: str, file: Path) -> str:
+        for source in _below(whole, text):
+            text = _renamed(text, source, str(to.absolute() / source.relative_to(whole)))
+        return text
+
+    shutil.copytree(run, beside, ignore=shutil.ignore_patterns(".lock"))
+    _change_scenes(beside, change)
+    keep_run(beside, to)
+
+
+def _change_scenes(run: Path, change: Callable[[str, Path], str]) -> None:
     for file in [run / "scene.toml", *sorted(run.glob("scenes/*.toml"))]:
         if file.is_file():
             text = file.read_text(encoding="utf-8")
-            moved = _within(text, (was or run).resolve(), "../" if file.parent != run else "")
-            moved = kept(moved, file.parent, f"{file.stem}_files")
-            if moved != text:
-                write(file, moved.encode())
+            changed = change(text, file)
+            if changed != text:
+                write(file, changed.encode())
 
 
-def _within(text: str, run: Path, up: str) -> str:
-    """The same, with files of the run folder named from within it."""
-    for file in _below(run, text):
-        text = _renamed(text, file, up + file.relative_to(run).as_posix())
-    return text
-
-
-def _in_scratch(text: str) -> list[Path]:
-    """The files of this process' folders that a text names."""
-    return [file for folder in sorted(_FOLDERS) for file in _below(folder, text)]
+def _named(text: str, folders: Iterable[Path]) -> list[Path]:
+    """The files of folders that a text names."""
+    return [file for folder in sorted(folders) for file in _below(folder, text)]
 
 
 def _below(folder: Path, text: str) -> Iterator[Path]:

@@ -6,7 +6,6 @@ Each runs in a process of its own and leaves a folder, which `Study` is a view o
 from __future__ import annotations
 
 import json
-import shutil
 import tempfile
 import warnings
 from collections.abc import Iterable, Sequence
@@ -17,7 +16,7 @@ from .command import run as run_command
 from .errors import FileError, SkinfitWarning, StudyError
 from .given import FilePath, Names, names
 from .html import framed
-from .scratch import Scratch, keep_run
+from .scratch import Scratch, copy_run, stays
 from .table import Row, best, read_csv
 
 if TYPE_CHECKING:
@@ -115,8 +114,8 @@ def ablate(
     """Leave each effect and term out in turn: what the images lose, and what is saved (`skinfit ablate`).
 
     `pairs`: two at a time, too; `refit`: fit what is left again; `params`: constants of an earlier fit, a `params.toml`;
-    `hold_out`: views that no fit sees, one or several; `gpu`: whether the renderer is timed. Results go into the folder `run`, by default
-    one that goes with the `Study`. Raises `StudyError`.
+    `hold_out`: views that no fit sees, one or several; `gpu`: whether the renderer is timed. Results go into the folder
+    `run`, by default one that goes with the `Study`. Raises `StudyError`.
     """
     words = [*_flag("--pairs", pairs), *_flag("--refit", refit), *_option("--params", params)]
     return _study("ablate", scenes, run, [*words, *_each("--hold-out", hold_out), "--gpu", gpu])
@@ -134,8 +133,8 @@ def tradeoff(
 ) -> Study:
     """Sweep each approximation, error beside cost (`skinfit tradeoff`).
 
-    `axes`: those to sweep, one or several, by default every one; `within`: name the cheapest settings that are off by no more than this
-    share together, as 0.005; `budget`: the most accurate ones that take no longer than so many seconds. The rest as of
+    `axes`: those to sweep, one or several, by default every one; `within`: name the cheapest settings that are off by no
+    more than this share together, as 0.005; `budget`: the most accurate ones that take no longer than so many seconds. The rest as of
     `ablate`. `Study.plots` has a plot for each axis.
     """
     share = None if within is None else f"{100.0 * within:.12g}%"
@@ -170,8 +169,8 @@ def copy(folder: Path, to: Path) -> Path:
     try:
         to.absolute().parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".skinfit-", dir=to.absolute().parent) as beside:
-            copied = Path(shutil.copytree(folder, Path(beside) / "run", ignore=shutil.ignore_patterns(".lock")))
-            keep_run(copied, folder)
+            copied = Path(beside) / "run"
+            copy_run(folder, to, copied)
             return copied.rename(to)
     except OSError as error:
         raise FileError(f"{to}: the run cannot be copied there: {error.strerror or error}. Name another folder.") from error
@@ -187,7 +186,7 @@ def _study(command: str, given: Iterable[Scene], run: FilePath | None, words: Se
     if said.failed and not any(place.glob("*.json")):
         raise StudyError("\n".join(said.told))
     if scratch is None:
-        keep_run(place)
+        stays(place)
     for words_told in said.told:
         warnings.warn(words_told.removeprefix("warning: "), SkinfitWarning, stacklevel=3)
     return Study(place, said.out, said.failed, scratch)
@@ -197,7 +196,9 @@ def _scenes(command: str, given: Iterable[Scene]) -> list[Scene]:
     """The scenes, of which there has to be one."""
     from .scene import Scene
 
-    scenes = list(given) if isinstance(given, Iterable) else [given]
+    if not isinstance(given, Iterable):
+        raise StudyError(f"{command}: {given!r} is no list of scenes, or no scene. Give a list, as [scene].")
+    scenes = list(given)
     for scene in scenes:
         if not isinstance(scene, Scene):
             raise StudyError(f"{command}: {scene!r} is no scene. Give a list of what load_file or load_dict returns.")

@@ -79,8 +79,8 @@ def best(rows: Iterable[Row]) -> Any:
 
 
 def read_csv(file: Path) -> list[Row]:
-    """The rows of a file that the command line has left: numbers, `True`, `False`, `None` where it is empty, words. Columns
-    of names and of settings are words, whatever they look like."""
+    """The rows of a file that the command line has left: numbers, `True`, `False`, `None` where it is empty, words.
+    Columns of names and of settings are words, whatever they look like."""
     with file.open(newline="", encoding="utf-8") as lines:
         return [{name: _read(name, text) for name, text in row.items()} for row in csv.DictReader(lines)]
 
