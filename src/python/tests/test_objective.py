@@ -101,3 +101,5 @@ def test_what_is_no_point_is_refused(objective: skinfit.Objective, x: Vector) ->
         objective.vjp(x, np.ones((2, 2, 3)))
     with pytest.raises(skinfit.ViewError, match="there is no view"):
         objective.image(x, "behind")
+    with pytest.raises(skinfit.ViewError, match="no name"):
+        objective.jvp(x, x, 1)  # type: ignore[arg-type]

@@ -117,6 +117,8 @@ def test_what_is_wrong_with_a_table_is_told(
 def test_a_path_is_no_dictionary() -> None:
     with pytest.raises(skinfit.SceneError, match="call load_file"):
         skinfit.load_dict("scene.toml")  # type: ignore[arg-type]
+    with pytest.raises(skinfit.SceneError, match="call load_dict"):
+        skinfit.load_file({})  # type: ignore[arg-type]
 
 
 def test_masks_haze_and_responses_are_arrays(cache: Path) -> None:
@@ -153,6 +155,12 @@ def test_a_folder_with_another_scene_is_refused(cache: Path, tmp_path: Path) -> 
         with pytest.raises(skinfit.SceneError, match="another scene is in this folder"):
             skinfit.load_dict(other, folder=tmp_path / "kept", cache=cache)
     skinfit.load_dict(described(), folder=tmp_path / "kept", cache=cache)
+    # One that is refused takes no place, nor anything from the one that is there.
+    with pytest.raises(skinfit.SceneError, match="Did you mean `width`"):
+        skinfit.load_dict(described(widht=3), folder=tmp_path / "other", cache=cache)
+    assert not list((tmp_path / "other").iterdir())
+    with pytest.raises(skinfit.SceneError, match="difuse"):
+        skinfit.load_dict(described(), folder=tmp_path / "kept", effects="difuse", cache=cache)
     assert {file.name: file.read_bytes() for file in first.path.parent.iterdir()} == kept
 
 
@@ -260,6 +268,9 @@ def test_a_refusal_is_the_command_lines_paragraph(program: Program, tmp_path: Pa
 def test_a_view_that_there_is_not_is_a_view_error(scene: skinfit.Scene) -> None:
     with pytest.raises(skinfit.ViewError, match="there is no view `behind`"):
         scene.render("behind")
+    for wrong in (0, "\ud800"):
+        with pytest.raises(skinfit.ViewError):
+            scene.render(wrong)  # type: ignore[arg-type]
     with pytest.raises(skinfit.ViewError):
         scene.objective(hold_out=["behind"])
     with pytest.raises(skinfit.SceneError, match="difuse"):

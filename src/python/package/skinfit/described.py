@@ -35,9 +35,9 @@ _MASK = "Give truth values, or floating-point numbers in [0, 1]: codes divided b
 _LIGHTS = ("file", "color", "target", "haze")
 
 
-def describe(scene: Mapping[str, Any], folder: Path) -> Path:
-    """Write the scene as `scene.toml` in `folder`, with a file for each array: the scene's file. Nothing is written where
-    something is wrong, or another scene is there."""
+def describe(scene: Mapping[str, Any], folder: Path) -> list[Path]:
+    """Write the scene as `scene.toml` in `folder`, with a file for each array: the files that were not there. Nothing is
+    written where something is wrong, or another scene is there."""
     if not isinstance(scene, Mapping):
         raise SceneError(f"{scene!r} is no dictionary. To read a scene file, call load_file.")
     try:
@@ -45,12 +45,11 @@ def describe(scene: Mapping[str, Any], folder: Path) -> Path:
         # Beside its place, so that it is there whole or not at all.
         with tempfile.TemporaryDirectory(prefix=".skinfit-", dir=folder) as beside:
             _write(scene, Path(beside))
-            place(Path(beside), folder)
+            return place(Path(beside), folder)
     except OSError as error:
         if isinstance(error, FileError):
             raise
         raise FileError(f"{folder}: cannot be written: {error.strerror}. Name another folder.") from error
-    return folder / "scene.toml"
 
 
 def _write(scene: Mapping[str, Any], folder: Path) -> None:

@@ -58,8 +58,15 @@ def load_dict(
     [0.5, 0.5, 0.5]
     """
     scratch = Scratch() if folder is None else None
-    file = describe(scene, Path(scratch.name if scratch is not None else str(folder)))
-    return read(file, cache_folder(cache), effects, scratch)
+    place = Path(scratch.name if scratch is not None else str(folder))
+    new = describe(scene, place)
+    try:
+        return read(place / "scene.toml", cache_folder(cache), effects, scratch)
+    except BaseException:
+        # Where it is mended, and written there again, it is no other scene's place.
+        for file in new:
+            file.unlink(missing_ok=True)
+        raise
 
 
 def demo(folder: FilePath | None = None, *, effects: Names | None = None, cache: Cache = True) -> Scene:

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _native
-from .errors import ArrayError, ParamError
-from .given import Number, numbers
+from .errors import ArrayError, ParamError, ViewError
+from .given import Number, name, numbers
 
 Vector = NDArray[np.float64]
 
@@ -97,20 +97,25 @@ class Objective:
     def image(self, x: ArrayLike, view: str | None = None) -> Vector:
         """(height, width, 3): a view (the first, unless named) in linear Rec.709 radiance, premultiplied by coverage, times
         the view's gain; 0 where no skin is seen. Raises `ViewError` where there is no such view."""
-        return self._native.image(vector(x), view)
+        return self._native.image(vector(x), view_name(view))
 
     def jvp(self, x: ArrayLike, v: ArrayLike, view: str | None = None) -> Vector:
         """(height, width, 3): how `image` moves as `x` moves along `v` (K,), the Jacobian times `v`: in linear radiance, with
         `v` in the units of `x`."""
-        return self._native.jvp(vector(x), vector(v), view)
+        return self._native.jvp(vector(x), vector(v), view_name(view))
 
     def vjp(self, x: ArrayLike, image: ArrayLike, view: str | None = None) -> Vector:
         """(K,): `image` (height, width, 3) times the Jacobian of `Objective.image`: the gradient of their inner product, a sum
         over pixels and channels, per unit of each constant."""
-        return self._native.vjp(vector(x), image_array(image, np.float64), view)
+        return self._native.vjp(vector(x), image_array(image, np.float64), view_name(view))
 
     def __repr__(self) -> str:
         return f"Objective({', '.join(self.names)}; views {', '.join(self.views)})"
+
+
+def view_name(view: str | None) -> str | None:
+    """A view's name, as the library takes it."""
+    return None if view is None else name(view, ViewError)
 
 
 def vector(x: ArrayLike) -> Vector:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, Union
 
@@ -13,7 +13,7 @@ from .errors import ArrayError, FileError, SceneError, SkinfitWarning, ViewError
 from .fit import Fit, FitSteps, Step, fit, fit_steps
 from .given import FilePath, Names, names
 from .maps import MapObjective
-from .objective import Objective
+from .objective import Objective, view_name
 from .page import Page
 from .params import Params
 from .rendering import Rendering
@@ -123,7 +123,7 @@ class Scene:
         >>> "hilite" in drawn.layers
         True
         """
-        drawn, warned = self._native.render(view, terms)
+        drawn, warned = self._native.render(view_name(view), terms)
         self._warn_once(warned)
         return Rendering(**drawn)
 
@@ -173,7 +173,7 @@ class Scene:
         """
         if not maps:
             raise ArrayError("no maps are named. Name some, or take objective(), which is of constants alone.")
-        native = self._native.map_objective(list(maps), names(hold_out, ViewError), adapter)
+        native = self._native.map_objective(names(maps, ArrayError), names(hold_out, ViewError), adapter)
         self._warn_once(native.warnings)
         return MapObjective(native)
 
@@ -250,6 +250,8 @@ def load_file(path: FilePath, *, effects: Names | None = None, cache: Cache = Tr
     >>> [view.name for view in scene.views]
     ['front', 'three_quarter', 'profile']
     """
+    if isinstance(path, Mapping):
+        raise SceneError("load_file reads a scene file. To read a scene from a dictionary, call load_dict.")
     return read(path, cache_folder(cache), effects)
 
 

@@ -51,9 +51,9 @@ def write(file: Path, content: bytes) -> None:
         raise
 
 
-def place(beside: Path, folder: Path) -> None:
-    """Move a scene and its files into their folder, the scene last. Raises `SceneError` where another one is there; the
-    same may be."""
+def place(beside: Path, folder: Path) -> list[Path]:
+    """Move a scene and its files into their folder, the scene last: those that were not there. Raises `SceneError` where
+    another one is there; the same may be."""
     files = sorted(beside.iterdir(), key=lambda file: (file.name == "scene.toml", file.name))
     for file in files:
         there = folder / file.name
@@ -61,8 +61,10 @@ def place(beside: Path, folder: Path) -> None:
             raise SceneError(
                 f"{there}: another scene is in this folder already. Name another folder, or remove what is in this one."
             )
+    new = [folder / file.name for file in files if not (folder / file.name).exists()]
     for file in files:
         os.replace(file, folder / file.name)
+    return new
 
 
 def kept(text: str, folder: Path, files: str) -> str:
