@@ -13,6 +13,7 @@ import numpy as np
 import OpenEXR
 import pytest
 import skinfit
+from skinfit.rendering import srgb
 
 from conftest import Program, grid, light
 
@@ -35,6 +36,7 @@ def test_an_image_is_the_command_lines_to_the_bit(
         assert np.array_equal(channels["A"].pixels, drawn.alpha)
     whole = sum(layer.astype(np.float64) for layer in drawn.layers.values())
     assert "hilite" in drawn.layers and np.allclose(whole, drawn.image, atol=1e-5)
+    assert srgb(np.array([-1.0, 0.0, 0.002, 0.5, 1.0, 2.0])).tolist() == [0, 0, 7, 188, 255, 255]
     assert drawn.image.dtype == np.float32 and drawn.srgb().dtype == np.uint8
 
 

@@ -1,15 +1,18 @@
 """Studies return tables and plots; what the command line refuses is raised."""
 
+import inspect
 import math
 import signal
 import subprocess
 import sys
 import textwrap
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 import skinfit
+from skinfit.study import AblateOptions, StabilityOptions, TradeoffOptions
 from skinfit.table import Table, read_csv
 
 
@@ -49,6 +52,23 @@ def test_a_study_of_no_scene_is_refused_at_once(small: skinfit.Scene, tmp_path: 
     with pytest.raises(skinfit.StudyError, match="no name"):
         small.tradeoff(axes=[3])  # type: ignore[list-item]
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("function", "options"),
+    [
+        (skinfit.ablate, AblateOptions),
+        (skinfit.tradeoff, TradeoffOptions),
+        (skinfit.stability, StabilityOptions),
+    ],
+)
+def test_a_scenes_studies_take_typed_options(function: Callable[..., skinfit.Study], options: type) -> None:
+    asked = inspect.signature(function).parameters.values()
+    assert set(options.__annotations__) == {of.name for of in asked if of.kind is of.KEYWORD_ONLY}
+    method = getattr(skinfit.Scene, function.__name__)
+    assert method.__annotations__["options"] == f"Unpack[{options.__name__}]"
+    for fit in (skinfit.Scene.fit, skinfit.Scene.fit_steps):
+        assert fit.__annotations__["options"] == "Unpack[FitOptions]"
 
 
 def test_changed_values_go_into_a_study(scene: skinfit.Scene, tmp_path: Path) -> None:
