@@ -3,11 +3,15 @@
 import json
 import struct
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import OpenEXR
 import pytest
 from skinfit.described import toml
-from skinfit.errors import ArrayError
+from skinfit.errors import ArrayError, SceneError
+from skinfit.exr import plane
+from skinfit.given import names
 from skinfit.mesh import glb
 
 
@@ -45,6 +49,46 @@ def test_a_mesh_is_a_binary_gltf_file() -> None:
 def test_a_mesh_without_positions_is_refused() -> None:
     with pytest.raises(ArrayError, match="there are no positions"):
         glb({"triangles": [[0, 1, 2]]})
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"triangles": [[0.0, 1.0, 2.0]]}, "mesh: triangles: holds floating-point numbers .* Give integers"),
+        ({"triangles": [[True, False, True]]}, "truth values"),
+        ({"positions": [[0, 0, 0], [1, 0], [0, 2, 0]]}, "mesh: positions"),
+        ({"positions": [[0, 0, "0"]] * 3}, "holds words"),
+        ({"positions": [[0, 0, 1j]] * 3}, "complex numbers"),
+        ({"positions": [[0, 0, 0], [0, np.inf, 0], [0, 0, 0]]}, r"positions\[1, 1\]: inf is not finite"),
+        ({"positions": [[0, 0, 0], [0, 0, 0], [1e39, 0, 0]]}, r"positions\[2, 0\]: 1e\+39 is beyond"),
+        ({3: []}, "3 is no array"),
+    ],
+)
+def test_numbers_that_are_no_mesh_are_refused(change: dict[Any, Any], words: str) -> None:
+    with pytest.raises(ArrayError, match=words):
+        glb({"positions": np.zeros((3, 3)), "triangles": [[0, 1, 2]], **change})
+
+
+@pytest.mark.parametrize(
+    "tables", [{"a": {"b": "\ud800"}}, {"a": {"\ud800": 1}}, {"a": {3: 1}}, {"a": {"b": b"x"}}, {"a": {"b": None}}]
+)
+def test_what_no_file_holds_is_refused(tables: dict[str, Any]) -> None:
+    with pytest.raises(SceneError):
+        toml(tables)
+
+
+def test_one_name_is_a_list_of_one() -> None:
+    assert names("side", SceneError) == ["side"] and names(iter(("a", "b")), SceneError) == ["a", "b"]
+    for wrong in (3, [3], ["a", None], "\ud800"):
+        with pytest.raises(SceneError):
+            names(wrong, SceneError)  # type: ignore[arg-type]
+
+
+def test_a_plane_is_an_openexr_file(tmp_path: Path) -> None:
+    numbers = np.arange(6, dtype=np.float32).reshape(2, 3)
+    (tmp_path / "a.exr").write_bytes(plane("haze.Y", numbers))
+    with OpenEXR.File(str(tmp_path / "a.exr"), separate_channels=True) as read:
+        assert np.array_equal(read.channels()["haze.Y"].pixels, numbers)
 
 
 def test_the_package_is_typed() -> None:

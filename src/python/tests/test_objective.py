@@ -92,7 +92,14 @@ def test_what_is_no_point_is_refused(objective: skinfit.Objective, x: Vector) ->
         objective.loss(outside)
     with pytest.raises(skinfit.ParamError):
         objective.loss(np.full_like(x, np.nan))
+    for wrong in ("abc", None, x + 1j, [*x[:-1], "0.5"], np.ones(len(x), dtype=bool)):
+        with pytest.raises(skinfit.ParamError, match="x: holds"):
+            objective.loss(wrong)
+    with pytest.raises(skinfit.ArrayError, match="complex"):
+        objective.vjp(x, np.ones((2, 2, 3), dtype=complex))
     with pytest.raises(skinfit.ArrayError):
         objective.vjp(x, np.ones((2, 2, 3)))
     with pytest.raises(skinfit.ViewError, match="there is no view"):
         objective.image(x, "behind")
+    with pytest.raises(skinfit.ViewError, match="no name"):
+        objective.jvp(x, x, 1)  # type: ignore[arg-type]

@@ -1,14 +1,18 @@
 """Studies return tables and plots; what the command line refuses is raised."""
 
+import inspect
+import math
 import signal
 import subprocess
 import sys
 import textwrap
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 import skinfit
+from skinfit.study import AblateOptions, StabilityOptions, TradeoffOptions
 from skinfit.table import Table, read_csv
 
 
@@ -24,7 +28,7 @@ def test_an_ablation_is_a_table(small: skinfit.Scene, tmp_path: Path, unwarned: 
 
 
 def test_a_tradeoff_has_a_plot_for_each_axis(small: skinfit.Scene, unwarned: None) -> None:
-    study = small.tradeoff(axes=["filter"])
+    study = small.tradeoff(axes="filter")
     assert list(study.plots) == ["filter"] and "<svg" in study.plots["filter"]
     assert all(row["axis"] == "filter" for row in study.rows())
     assert "<iframe" in study._repr_html_()
@@ -38,6 +42,33 @@ def test_a_study_of_stability_has_a_row_for_each_case(small: skinfit.Scene, unwa
     assert not study.failed and all(row["failure"] is None for row in rows)
     assert {row["search"] for row in rows} == {"hard", "random", "lights", "scene"}
     assert "<table" in study._repr_html_()
+
+
+def test_a_study_of_no_scene_is_refused_at_once(small: skinfit.Scene, tmp_path: Path) -> None:
+    for study in (skinfit.ablate, skinfit.tradeoff, skinfit.stability):
+        for wrong in ([], [None], [small.path], small):
+            with pytest.raises(skinfit.StudyError, match="no scene"):
+                study(wrong, run=tmp_path / "run")  # type: ignore[operator]
+    with pytest.raises(skinfit.StudyError, match="no name"):
+        small.tradeoff(axes=[3])  # type: ignore[list-item]
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("function", "options"),
+    [
+        (skinfit.ablate, AblateOptions),
+        (skinfit.tradeoff, TradeoffOptions),
+        (skinfit.stability, StabilityOptions),
+    ],
+)
+def test_a_scenes_studies_take_typed_options(function: Callable[..., skinfit.Study], options: type) -> None:
+    asked = inspect.signature(function).parameters.values()
+    assert set(options.__annotations__) == {of.name for of in asked if of.kind is of.KEYWORD_ONLY}
+    method = getattr(skinfit.Scene, function.__name__)
+    assert method.__annotations__["options"] == f"Unpack[{options.__name__}]"
+    for fit in (skinfit.Scene.fit, skinfit.Scene.fit_steps):
+        assert fit.__annotations__["options"] == "Unpack[FitOptions]"
 
 
 def test_changed_values_go_into_a_study(scene: skinfit.Scene, tmp_path: Path) -> None:
@@ -75,5 +106,9 @@ def test_a_table_is_a_list_of_rows(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("name,n,x,on\na,1,2.5,true\nb,,1e-3,false\n")
     table = Table(read_csv(tmp_path / "a.csv"))
     assert table[0] == {"name": "a", "n": 1, "x": 2.5, "on": True} and table.column("n") == [1, None]
+    (tmp_path / "b.csv").write_text("view,left_out,setting,loss,n\n01,1_0,64,1_0,+2\ntrue,nan,1e3,-inf,\n")
+    rows = read_csv(tmp_path / "b.csv")
+    assert rows[0] == {"view": "01", "left_out": "1_0", "setting": "64", "loss": "1_0", "n": 2}
+    assert rows[1] == {"view": "true", "left_out": "nan", "setting": "1e3", "loss": -math.inf, "n": None}
     assert len(table[1:]) == 1 and repr(table).splitlines()[0].split() == ["name", "n", "x", "on"]
     assert "<td>2.5</td>" in table._repr_html_()

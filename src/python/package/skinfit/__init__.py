@@ -35,12 +35,13 @@ from .errors import (  # noqa: E402
     ViewError,
 )
 from .fit import Fit, FitOptions, FitSteps, Iteration, Scores, Step, fit, fit_steps, load_run  # noqa: E402
+from .loading import demo, load_dict  # noqa: E402
 from .maps import MapGradients, MapObjective  # noqa: E402
 from .objective import NormalEquations, Objective  # noqa: E402
 from .page import Page  # noqa: E402
 from .params import ParamInfo, Params  # noqa: E402
 from .rendering import Rendering  # noqa: E402
-from .scene import Scene, View, demo, load_dict, load_file  # noqa: E402
+from .scene import Scene, View, load_file  # noqa: E402
 from .study import Study, ablate, stability, tradeoff  # noqa: E402
 from .table import Table  # noqa: E402
 

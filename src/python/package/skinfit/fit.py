@@ -28,6 +28,7 @@ from .page import Page
 from .page import write as write_page
 from .params import Value
 from .progress import Progress
+from .scratch import stays
 from .study import copy
 from .table import best
 
@@ -286,6 +287,8 @@ class FitSteps(Iterator[Step]):
         """Wait for its end: what it has found. Raises `FitError` where it was refused or failed."""
         said, told = self._native.finish()
         _warn(told)
+        if self._scratch is None:
+            stays(self._run)
         return Fit(self._run, self._scenes, "\n".join(said), self._scratch)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import ArrayError
+from .given import Number, numbers
 
 _FLOAT, _UNSIGNED = 5126, 5125
 _VERTICES, _INDICES = 34962, 34963
@@ -20,18 +21,18 @@ _ATTRIBUTES = {"positions": ("POSITION", 3, True), "normals": ("NORMAL", 3, Fals
 
 def glb(mesh: Mapping[str, Any]) -> bytes:
     """The file's bytes. Raises `ArrayError` where an array is missing, unknown, or of another shape."""
-    unknown = sorted(set(mesh) - {"triangles", *_ATTRIBUTES})
+    unknown = sorted(map(str, set(mesh) - {"triangles", *_ATTRIBUTES}))
     if unknown:
         raise ArrayError(f"mesh: {', '.join(unknown)} is no array of a mesh. Give {', '.join(_ATTRIBUTES)}, triangles.")
     buffer = _Buffer()
     attributes = {}
-    count = _rows("positions", mesh.get("positions"), 3, np.float32).shape[0]
+    count = len(_rows("positions", mesh.get("positions"), 3, np.float32))
     for name, (semantic, width, required) in _ATTRIBUTES.items():
         if required or mesh.get(name) is not None:
-            numbers = _rows(name, mesh[name], width, np.float32)
-            if numbers.shape[0] != count:
-                raise ArrayError(f"mesh: {numbers.shape[0]} {name} for {count} positions. Give one for each.")
-            attributes[semantic] = buffer.add(numbers, _VERTICES)
+            rows = _rows(name, mesh[name], width, np.float32)
+            if len(rows) != count:
+                raise ArrayError(f"mesh: {len(rows)} {name} for {count} positions. Give one for each.")
+            attributes[semantic] = buffer.add(rows, _VERTICES)
     triangles = _rows("triangles", mesh.get("triangles"), 3, np.int64)
     if triangles.size and not (0 <= triangles.min() and triangles.max() < count):
         raise ArrayError(f"mesh: triangles name vertices beyond the {count} that there are. Count them from 0.")
@@ -39,15 +40,15 @@ def glb(mesh: Mapping[str, Any]) -> bytes:
     return buffer.file({"attributes": attributes, "indices": indices})
 
 
-def _rows(name: str, value: Any, width: int, kind: type[np.generic]) -> NDArray[Any]:
+def _rows(name: str, value: Any, width: int, kind: type[Number]) -> NDArray[Number]:
     if value is None:
         raise ArrayError(f"mesh: there are no {name}. Give an array of (n, {width}).")
-    numbers = np.asarray(value)
-    if numbers.ndim != 2 or numbers.shape[1] != width:
-        raise ArrayError(f"mesh: {name} of shape {numbers.shape}. Give an array of (n, {width}).")
-    if not np.isfinite(numbers).all():
-        raise ArrayError(f"mesh: {name} that are not finite. Give finite numbers.")
-    return numbers.astype(kind)
+    whole = np.issubdtype(kind, np.integer)
+    remedy = f"Give {'integers' if whole else 'finite numbers'} as an array of (n, {width})."
+    taken = numbers(f"mesh: {name}", value, kind, remedy, kinds="iu" if whole else "fiu")
+    if taken.ndim != 2 or taken.shape[1] != width:
+        raise ArrayError(f"mesh: {name} of shape {taken.shape}. {remedy}")
+    return taken
 
 
 class _Buffer:

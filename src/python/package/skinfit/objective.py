@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _native
-from .errors import ArrayError
+from .errors import ArrayError, ParamError, ViewError
+from .given import Number, name, numbers
 
 Vector = NDArray[np.float64]
-Number = TypeVar("Number", np.float32, np.float64)
 
 
 @dataclass(frozen=True)
@@ -36,8 +35,9 @@ class NormalEquations:
 class Objective:
     """The loss of a scene over its free constants, at the values that it had when this was made.
 
-    `x` below is an array of (K,) float64, a number for each of `names`, within `bounds`: outside of them, and where it is
-    not finite, `ParamError` is raised; of another length, `ArrayError`. Angles are in degrees, as in scene files.
+    `x` below is an array of (K,) float64, a number for each of `names`, in the unit of its parameter (`ParamInfo.unit`;
+    angles in degrees, gains without), within `bounds`: outside of them, and where it is not finite or no number,
+    `ParamError` is raised; of another length, `ArrayError`.
 
     Loss, gradient and normal equations are those of the CPU engine, by the numbers of which `Scene.fit` goes. Images and
     products of their Jacobian are computed in float64.
@@ -77,15 +77,17 @@ class Objective:
         return self._native.bounds
 
     def loss(self, x: ArrayLike) -> float:
-        """The loss."""
+        """The loss that `Scene.loss` names, at `x`: the mean over weighted residuals, without priors. Of `l2` and `huber` it
+        is in squared linear radiance, of `relative_l2` and `smape` dimensionless."""
         return self._native.loss(vector(x))
 
     def gradient(self, x: ArrayLike) -> Vector:
-        """(K,): the loss' gradient."""
+        """(K,): the loss' gradient, the loss per unit of each constant."""
         return self.loss_and_gradient(x)[1]
 
     def loss_and_gradient(self, x: ArrayLike) -> tuple[float, Vector]:
-        """The loss and its gradient (K,), in one pass: `scipy.optimize.minimize(f.loss_and_gradient, f.start, jac=True)`."""
+        """The loss and its gradient (K,), per unit of each constant, in one pass:
+        `scipy.optimize.minimize(f.loss_and_gradient, f.start, jac=True)`."""
         return self._native.loss_and_gradient(vector(x))
 
     def normal_equations(self, x: ArrayLike) -> NormalEquations:
@@ -95,31 +97,41 @@ class Objective:
     def image(self, x: ArrayLike, view: str | None = None) -> Vector:
         """(height, width, 3): a view (the first, unless named) in linear Rec.709 radiance, premultiplied by coverage, times
         the view's gain; 0 where no skin is seen. Raises `ViewError` where there is no such view."""
-        return self._native.image(vector(x), view)
+        return self._native.image(vector(x), view_name(view))
 
     def jvp(self, x: ArrayLike, v: ArrayLike, view: str | None = None) -> Vector:
-        """(height, width, 3): how `image` moves as `x` moves along `v` (K,), the Jacobian times `v`."""
-        return self._native.jvp(vector(x), vector(v), view)
+        """(height, width, 3): how `image` moves as `x` moves along `v` (K,), the Jacobian times `v`: in linear radiance, with
+        `v` in the units of `x`."""
+        return self._native.jvp(vector(x), vector(v), view_name(view))
 
     def vjp(self, x: ArrayLike, image: ArrayLike, view: str | None = None) -> Vector:
-        """(K,): `image` (height, width, 3) times the Jacobian of `Objective.image`: the gradient of their inner product."""
-        return self._native.vjp(vector(x), image_array(image, np.float64), view)
+        """(K,): `image` (height, width, 3) times the Jacobian of `Objective.image`: the gradient of their inner product, a sum
+        over pixels and channels, per unit of each constant."""
+        return self._native.vjp(vector(x), image_array(image, np.float64), view_name(view))
 
     def __repr__(self) -> str:
         return f"Objective({', '.join(self.names)}; views {', '.join(self.views)})"
 
 
+def view_name(view: str | None) -> str | None:
+    """A view's name, as the library takes it."""
+    return None if view is None else name(view, ViewError)
+
+
 def vector(x: ArrayLike) -> Vector:
     """Constants, as the library takes them."""
-    array = np.asarray(x, dtype=np.float64)
+    remedy = "Give a number for each free constant."
+    # What is not finite is out of bounds, of which the library tells the constant.
+    array = numbers("x", x, np.float64, remedy, kinds="fiu", finite=False, refused=ParamError)
     if array.ndim != 1:
-        raise ArrayError(f"an array of shape {array.shape} is no vector. Give a number for each free constant.")
+        raise ArrayError(f"an array of shape {array.shape} is no vector. {remedy}")
     return array
 
 
 def image_array(image: ArrayLike, kind: type[Number]) -> NDArray[Number]:
     """An image, as the library takes it."""
-    array = np.asarray(image, dtype=kind)
+    remedy = "Give height x width x 3 numbers."
+    array = numbers("image", image, kind, remedy, kinds="fiu", finite=False)
     if array.ndim != 3:
-        raise ArrayError(f"an array of shape {array.shape} is no image. Give height x width x 3 numbers.")
+        raise ArrayError(f"an array of shape {array.shape} is no image. {remedy}")
     return array

@@ -7,19 +7,15 @@ It is written into the player, the page without a scene, which `src/page/build` 
 from __future__ import annotations
 
 import os
-import tempfile
 import warnings
 from collections.abc import Sequence
-from os import PathLike
 from pathlib import Path
-from typing import Union
 from urllib.parse import quote
 
 from .command import PLAYER, run
 from .errors import FileError, SkinfitWarning
+from .given import FilePath
 from .html import framed
-
-FilePath = Union[str, "PathLike[str]"]
 
 
 class Page:
@@ -49,11 +45,6 @@ def write(of: Sequence[str], file: Path, player: FilePath | None, kept: object =
     for words in run(run_words, FileError).told:
         warnings.warn(words.removeprefix("warning: "), SkinfitWarning, stacklevel=3)
     return Page(file, kept)
-
-
-def scratch() -> tempfile.TemporaryDirectory[str]:
-    """A folder for a page that nobody has named a file for."""
-    return tempfile.TemporaryDirectory(prefix="skinfit-", ignore_cleanup_errors=True)
 
 
 def _player(given: FilePath | None) -> Path:

@@ -6,6 +6,7 @@ import struct
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,10 +28,7 @@ class Rendering:
 
     def srgb(self, exposure: float = 0.0) -> NDArray[np.uint8]:
         """(height, width, 3) codes for a screen: brightened by `exposure` stops, clipped, sRGB's curve, on black."""
-        linear = np.clip(self.image.astype(np.float64) * 2.0**exposure, 0.0, 1.0)
-        curved = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-        codes: NDArray[np.uint8] = np.round(255.0 * curved).astype(np.uint8)
-        return codes
+        return srgb(self.image.astype(np.float64) * 2.0**exposure)
 
     def _repr_png_(self) -> bytes:
         """What a notebook shows: the image as `srgb` has it."""
@@ -41,6 +39,14 @@ class Rendering:
         header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
         chunks = [(b"IHDR", header), (b"sRGB", b"\0"), (b"IDAT", zlib.compress(rows.tobytes())), (b"IEND", b"")]
         return b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(kind, content) for kind, content in chunks)
+
+
+def srgb(linear: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
+    """Codes of linear light, clipped to [0, 1], by sRGB's curve."""
+    clipped = np.clip(linear, 0.0, 1.0)
+    curved = np.where(clipped <= 0.0031308, 12.92 * clipped, 1.055 * clipped ** (1 / 2.4) - 0.055)
+    codes: NDArray[np.uint8] = np.round(255.0 * curved).astype(np.uint8)
+    return codes
 
 
 def _chunk(kind: bytes, content: bytes) -> bytes:

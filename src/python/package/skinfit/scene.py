@@ -5,23 +5,26 @@ from __future__ import annotations
 import tempfile
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from os import PathLike
 from pathlib import Path
-from typing import Any, NamedTuple, Union
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, Union
 
 from . import _native, page, study
-from .described import describe
-from .errors import ArrayError, SkinfitWarning
+from .errors import ArrayError, FileError, SceneError, SkinfitWarning, ViewError
 from .fit import Fit, FitSteps, Step, fit, fit_steps
+from .given import FilePath, Names, names
 from .maps import MapObjective
-from .objective import Objective
+from .objective import Objective, view_name
 from .page import Page
 from .params import Params
 from .rendering import Rendering
+from .scratch import Scratch, kept, write
 from .study import Study
 
-FilePath = Union[str, "PathLike[str]"]
-"""A path to a file or folder."""
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from .fit import FitOptions
+    from .study import AblateOptions, StabilityOptions, TradeoffOptions
 
 Cache = Union[FilePath, bool]
 """Where bakes are kept between runs: `True` for the user's cache folder (`$SKINFIT_CACHE`), `False` for nowhere."""
@@ -44,14 +47,37 @@ class Scene:
     Made by `load_file`, `load_dict` and `demo`.
     """
 
-    def __init__(self, native: _native.Scene, folder: tempfile.TemporaryDirectory[str] | None = None) -> None:
+    def __init__(self, native: _native.Scene, folder: Scratch | None = None, effects: str | None = None) -> None:
         self._native = native
-        # Files that arrays were written to: they go with the scene.
+        # Files that arrays were written to: they go with the scenes that were made of them.
         self._folder = folder
+        # The effects that it was read with, where they are not its file's.
+        self._effects = effects
         self._params = Params(native)
         # What was told of it.
         self._told: set[str] = set()
         self._warn_once(native.warnings)
+
+    def copy(self) -> Scene:
+        """Another scene of the same file, read anew, with values of its own that are this one's now."""
+        other = Scene.__new__(Scene)
+        native = _native.Scene(self.path, self._native.cache, self._effects)
+        other._native, other._folder, other._effects = native, self._folder, self._effects
+        other._params, other._told = Params(native), set(self._told)
+        other._params._take(self._params)
+        return other
+
+    def __copy__(self) -> Scene:
+        return self.copy()
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Scene:
+        return self.copy()
+
+    def __reduce_ex__(self, protocol: object) -> NoReturn:
+        raise TypeError(
+            "a scene is not pickled: it holds what the library has read. Pickle its path, or that of a file that it was "
+            "saved to, and load that: skinfit.load_file(path)."
+        )
 
     @property
     def path(self) -> Path:
@@ -97,7 +123,7 @@ class Scene:
         >>> "hilite" in drawn.layers
         True
         """
-        drawn, warned = self._native.render(view, terms)
+        drawn, warned = self._native.render(view_name(view), terms)
         self._warn_once(warned)
         return Rendering(**drawn)
 
@@ -107,33 +133,35 @@ class Scene:
         *,
         run: FilePath | None = None,
         resume: bool = False,
-        hold_out: Sequence[str] = (),
+        hold_out: Names = (),
         progress: bool | None = None,
-        **options: Any,
+        **options: Unpack[FitOptions],
     ) -> Fit:
         """Fit what is free to the targets: `skinfit.fit` of this scene alone, where arguments and options are described."""
-        return fit([self], callback, run=run, resume=resume, hold_out=hold_out, progress=progress, **options)
+        held = names(hold_out, ViewError)
+        return fit([self], callback, run=run, resume=resume, hold_out=held, progress=progress, **options)
 
     def fit_steps(
         self,
         *,
         run: FilePath | None = None,
         resume: bool = False,
-        hold_out: Sequence[str] = (),
-        **options: Any,
+        hold_out: Names = (),
+        **options: Unpack[FitOptions],
     ) -> FitSteps:
         """The same fit, step by step: `skinfit.fit_steps` of this scene alone."""
-        return fit_steps([self], run=run, resume=resume, hold_out=hold_out, **options)
+        return fit_steps([self], run=run, resume=resume, hold_out=names(hold_out, ViewError), **options)
 
-    def objective(self, hold_out: Sequence[str] = ()) -> Objective:
+    def objective(self, hold_out: Names = ()) -> Objective:
         """The scene's fit as a function of what is free, at the values of now, over the views with a target that are not
-        held out. Raises `SceneError` where no view has a target, `ViewError` for a name that is none."""
-        native = self._native.objective(list(hold_out))
+        held out, by one name or several. Raises `SceneError` where no view has a target, `ViewError` for a name that is
+        none."""
+        native = self._native.objective(names(hold_out, ViewError))
         self._warn_once(native.warnings)
         return Objective(native)
 
     def map_objective(
-        self, *maps: str, hold_out: Sequence[str] = (), adapter: str | None = None
+        self, *maps: str, hold_out: Names = (), adapter: str | None = None
     ) -> MapObjective:
         """The same as a function of whole maps as well: `color`, `specular`, `attenuator`, `occlusion` (every vertex) and
         `environment` (every texel of the cubes that light is looked up in), any of them; on a graphics adapter (the fastest,
@@ -145,34 +173,46 @@ class Scene:
         """
         if not maps:
             raise ArrayError("no maps are named. Name some, or take objective(), which is of constants alone.")
-        native = self._native.map_objective(list(maps), list(hold_out), adapter)
+        native = self._native.map_objective(names(maps, ArrayError), names(hold_out, ViewError), adapter)
         self._warn_once(native.warnings)
         return MapObjective(native)
 
-    def ablate(self, **options: Any) -> Study:
+    def ablate(self, **options: Unpack[AblateOptions]) -> Study:
         """What each effect and term is worth: `skinfit.ablate` of this scene alone."""
         return study.ablate([self], **options)
 
-    def tradeoff(self, **options: Any) -> Study:
+    def tradeoff(self, **options: Unpack[TradeoffOptions]) -> Study:
         """What accuracy costs in time: `skinfit.tradeoff` of this scene alone."""
         return study.tradeoff([self], **options)
 
-    def stability(self, **options: Any) -> Study:
+    def stability(self, **options: Unpack[StabilityOptions]) -> Study:
         """Hard cases on every evaluator: `skinfit.stability` of this scene alone."""
         return study.stability([self], **options)
 
     def page(self, file: FilePath | None = None, *, player: FilePath | None = None, title: str | None = None) -> Page:
         """The scene at its values as a page for a browser, with sliders, images and fits: `Fit.page` says more. Without a
         `file` it goes with the `Page`."""
-        scratch = page.scratch()
+        scratch = Scratch()
         place = Path(scratch.name) / "page.html" if file is None else Path(file)
         with tempfile.TemporaryDirectory(prefix="skinfit-") as changed:
             words = [str(self._file(Path(changed))), *self._cache_words()]
             return page.write([*words, *([] if title is None else [f"--title={title}"])], place, player, scratch)
 
     def save(self, file: FilePath) -> None:
-        """Write the scene with its values as a scene file whose paths are absolute. Raises `FileError`."""
-        self._native.save(file)
+        """Write the scene with its values as a scene file whose paths are absolute. Files that go with the scene, as those
+        of arrays do, are copied into a folder beside it, `NAME_files`, and named from there. Raises `FileError`."""
+        if self._folder is None:
+            self._native.save(file)
+            return
+        place = Path(file)
+        with tempfile.TemporaryDirectory(prefix="skinfit-") as beside:
+            written = Path(beside) / "scene.toml"
+            self._native.save(written)
+            text = written.read_text(encoding="utf-8")
+        try:
+            write(place, kept(text, place.parent, f"{place.stem}_files").encode())
+        except OSError as error:
+            raise FileError(f"{place}: cannot be written: {error.strerror}. Name another file.") from error
 
     def _warn_once(self, words: Sequence[str]) -> None:
         """Warn of what was not told yet."""
@@ -187,7 +227,7 @@ class Scene:
             return self.path
         whole = self.path.absolute()
         file = folder / whole.parent.name / whole.name
-        self.save(file)
+        self._native.save(file)
         return file
 
     def _cache_words(self) -> list[str]:
@@ -200,8 +240,8 @@ class Scene:
         return f"Scene({str(self.path)!r}, views {views}; effects {', '.join(self.effects)})"
 
 
-def load_file(path: FilePath, *, effects: Sequence[str] | None = None, cache: Cache = True) -> Scene:
-    """Read a scene file, with its targets; with other `effects` than it names if they are given.
+def load_file(path: FilePath, *, effects: Names | None = None, cache: Cache = True) -> Scene:
+    """Read a scene file, with its targets; with other `effects` than it names if they are given, one or several.
 
     Raises `SceneError` with file, line, what is wrong and what to do. What was mended is a `SkinfitWarning`.
 
@@ -210,76 +250,19 @@ def load_file(path: FilePath, *, effects: Sequence[str] | None = None, cache: Ca
     >>> [view.name for view in scene.views]
     ['front', 'three_quarter', 'profile']
     """
-    return Scene(_native.Scene(path, _cache(cache), _list(effects)))
+    if isinstance(path, Mapping):
+        raise SceneError("load_file reads a scene file. To read a scene from a dictionary, call load_dict.")
+    return read(path, cache_folder(cache), effects)
 
 
-def load_dict(
-    scene: Mapping[str, Any],
-    *,
-    folder: FilePath | None = None,
-    effects: Sequence[str] | None = None,
-    cache: Cache = True,
-) -> Scene:
-    """Read a scene that is given as a dictionary with a scene file's keys.
-
-    Where a scene file names a file, an array may stand:
-
-    - images as (height, width), (height, width, 3) or, with coverage, (height, width, 4), in linear Rec.709:
-      `environment.file` (a lat-long panorama), `maps.color`, `.normal`, `.specular`, `.attenuator` and `.own`, and of a
-      view `target` (premultiplied where it has coverage) and `mask`. They are kept as float32;
-    - `mesh.file` as a dictionary of `positions` (V, 3), `triangles` (T, 3) of indices, `uvs` (V, 2) with the origin in the
-      image's upper left corner, and `normals` (V, 3) if there are any, in the scene's units.
-
-    Arrays are written into `folder`, which is made if need be, beside the scene as `scene.toml`; without one into a
-    folder that goes with the scene. Paths are relative to the working folder. Raises `ArrayError` for arrays of other
-    shapes, `SceneError` as `load_file` does.
-
-    >>> import numpy as np, skinfit
-    >>> square = {
-    ...     "positions": [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]],
-    ...     "uvs": [[0, 1], [1, 1], [1, 0], [0, 0]],
-    ...     "triangles": [[0, 1, 2], [0, 2, 3]],
-    ... }
-    >>> look = {"name": "front", "eye": [0, 0, 3], "look_at": [0, 0, 0], "fov_y_degrees": 50, "width": 8, "height": 6}
-    >>> scene = skinfit.load_dict({
-    ...     "mesh": {"file": square},
-    ...     "environment": {"file": np.ones((4, 8))},
-    ...     "model": {"effects": ["diffuse"], "params": {"base_weight": 0.5}},
-    ...     "view": [look],
-    ... })
-    >>> scene.render().image[3, 4].round(3).tolist()
-    [0.5, 0.5, 0.5]
-    """
-    scratch = tempfile.TemporaryDirectory(prefix="skinfit-") if folder is None else None
-    place = Path(scratch.name if scratch is not None else str(folder))
-    file = describe(scene, place)
-    return Scene(_native.Scene(file, _cache(cache), _list(effects)), scratch)
+def read(file: FilePath, cache: FilePath | None, effects: Names | None, folder: Scratch | None = None) -> Scene:
+    """Read a scene file, which goes with the scene where it is in `folder`."""
+    asked = None if effects is None else ",".join(names(effects, SceneError))
+    return Scene(_native.Scene(file, cache, asked), folder, asked)
 
 
-def demo(folder: FilePath | None = None, *, effects: Sequence[str] | None = None, cache: Cache = True) -> Scene:
-    """The built-in scene: a head that skinfit makes, whose targets its own model has drawn. Its files are kept below
-    `folder`, by default the cache.
-
-    >>> import skinfit
-    >>> scene = skinfit.demo()
-    >>> scene.params["rim_exponent"]
-    2.0
-    """
-    kept = _cache(cache)
-    scratch = None
-    if folder is None and kept is None:
-        scratch = tempfile.TemporaryDirectory(prefix="skinfit-")
-    place = folder or (scratch.name if scratch is not None else kept)
-    assert place is not None
-    file = _native.built_in_scene(place, kept)
-    return Scene(_native.Scene(file, kept, _list(effects)), scratch)
-
-
-def _cache(cache: Cache) -> FilePath | None:
+def cache_folder(cache: Cache) -> FilePath | None:
+    """Where bakes are kept, if they are."""
     if cache is True:
         return Path(_native.default_cache())
     return None if cache is False else cache
-
-
-def _list(effects: Sequence[str] | None) -> str | None:
-    return None if effects is None else ",".join(effects)

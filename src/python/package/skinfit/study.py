@@ -6,29 +6,62 @@ Each runs in a process of its own and leaves a folder, which `Study` is a view o
 from __future__ import annotations
 
 import json
-import shutil
 import tempfile
 import warnings
-from collections.abc import Sequence
-from os import PathLike
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Union
+from typing import TYPE_CHECKING, Any, Literal, TypedDict
 
 from .command import run as run_command
 from .errors import FileError, SkinfitWarning, StudyError
+from .given import FilePath, Names, names
 from .html import framed
+from .scratch import Scratch, copy_run, stays
 from .table import Row, best, read_csv
 
 if TYPE_CHECKING:
     from .scene import Scene
 
-FilePath = Union[str, "PathLike[str]"]
+Gpu = Literal["auto", "always", "never"]
+
+
+class AblateOptions(TypedDict, total=False):
+    """Those of `ablate`."""
+
+    run: FilePath | None
+    pairs: bool
+    refit: bool
+    params: FilePath | None
+    hold_out: Names
+    gpu: Gpu
+
+
+class TradeoffOptions(TypedDict, total=False):
+    """Those of `tradeoff`."""
+
+    run: FilePath | None
+    axes: Names
+    params: FilePath | None
+    hold_out: Names
+    within: float | None
+    budget: float | None
+
+
+class StabilityOptions(TypedDict, total=False):
+    """Those of `stability`."""
+
+    run: FilePath | None
+    cases: int
+    seed: int
+    pixels: int
+    replay: FilePath | None
+    gpu: bool
 
 
 class Study:
     """What a study has found, and its folder."""
 
-    def __init__(self, run: Path, text: str, failed: bool, scratch: tempfile.TemporaryDirectory[str] | None) -> None:
+    def __init__(self, run: Path, text: str, failed: bool, scratch: Scratch | None) -> None:
         self.run = run
         """Its folder: results, pictures and the report, as the command line leaves them."""
         self.failed = failed
@@ -69,39 +102,39 @@ class Study:
 
 
 def ablate(
-    scenes: Sequence[Scene],
+    scenes: Iterable[Scene],
     *,
     run: FilePath | None = None,
     pairs: bool = False,
     refit: bool = False,
     params: FilePath | None = None,
-    hold_out: Sequence[str] = (),
-    gpu: Literal["auto", "always", "never"] = "auto",
+    hold_out: Names = (),
+    gpu: Gpu = "auto",
 ) -> Study:
     """Leave each effect and term out in turn: what the images lose, and what is saved (`skinfit ablate`).
 
     `pairs`: two at a time, too; `refit`: fit what is left again; `params`: constants of an earlier fit, a `params.toml`;
-    `hold_out`: views that no fit sees; `gpu`: whether the renderer is timed. Results go into the folder `run`, by default
-    one that goes with the `Study`. Raises `StudyError`.
+    `hold_out`: views that no fit sees, one or several; `gpu`: whether the renderer is timed. Results go into the folder
+    `run`, by default one that goes with the `Study`. Raises `StudyError`.
     """
     words = [*_flag("--pairs", pairs), *_flag("--refit", refit), *_option("--params", params)]
     return _study("ablate", scenes, run, [*words, *_each("--hold-out", hold_out), "--gpu", gpu])
 
 
 def tradeoff(
-    scenes: Sequence[Scene],
+    scenes: Iterable[Scene],
     *,
     run: FilePath | None = None,
-    axes: Sequence[str] = (),
+    axes: Names = (),
     params: FilePath | None = None,
-    hold_out: Sequence[str] = (),
+    hold_out: Names = (),
     within: float | None = None,
     budget: float | None = None,
 ) -> Study:
     """Sweep each approximation, error beside cost (`skinfit tradeoff`).
 
-    `axes`: those to sweep, by default every one; `within`: name the cheapest settings that are off by no more than this
-    share together, as 0.005; `budget`: the most accurate ones that take no longer than so many seconds. The rest as of
+    `axes`: those to sweep, one or several, by default every one; `within`: name the cheapest settings that are off by no
+    more than this share together, as 0.005; `budget`: the most accurate ones that take no longer than so many seconds. The rest as of
     `ablate`. `Study.plots` has a plot for each axis.
     """
     share = None if within is None else f"{100.0 * within:.12g}%"
@@ -111,7 +144,7 @@ def tradeoff(
 
 
 def stability(
-    scenes: Sequence[Scene],
+    scenes: Iterable[Scene],
     *,
     run: FilePath | None = None,
     cases: int = 1000,
@@ -130,25 +163,48 @@ def stability(
 
 
 def copy(folder: Path, to: Path) -> Path:
-    """Copy a run folder to a place where nothing is yet."""
+    """Copy a run folder to a place where nothing is yet, whole or not at all. Files that go with a scene come along."""
+    if to.exists():
+        raise FileError(f"{to}: the run cannot be copied there: it exists already. Name another folder.")
     try:
-        return Path(shutil.copytree(folder, to, ignore=shutil.ignore_patterns(".lock")))
+        to.absolute().parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".skinfit-", dir=to.absolute().parent) as beside:
+            copied = Path(beside) / "run"
+            copy_run(folder, to, copied)
+            return copied.rename(to)
     except OSError as error:
         raise FileError(f"{to}: the run cannot be copied there: {error.strerror or error}. Name another folder.") from error
 
 
-def _study(command: str, scenes: Sequence[Scene], run: FilePath | None, words: Sequence[str]) -> Study:
-    scratch = tempfile.TemporaryDirectory(prefix="skinfit-") if run is None else None
+def _study(command: str, given: Iterable[Scene], run: FilePath | None, words: Sequence[str]) -> Study:
+    scenes = _scenes(command, given)
+    scratch = Scratch() if run is None else None
     place = Path(scratch.name) / command if scratch is not None else Path(str(run))
     with tempfile.TemporaryDirectory(prefix="skinfit-") as changed:
         files = [str(scene._file(Path(changed) / str(i))) for i, scene in enumerate(scenes)]
-        kept = scenes[0]._cache_words() if scenes else []
-        said = run_command([command, *files, "-o", str(place), *kept, *words], StudyError)
+        said = run_command([command, *files, "-o", str(place), *scenes[0]._cache_words(), *words], StudyError)
     if said.failed and not any(place.glob("*.json")):
         raise StudyError("\n".join(said.told))
+    if scratch is None:
+        stays(place)
     for words_told in said.told:
         warnings.warn(words_told.removeprefix("warning: "), SkinfitWarning, stacklevel=3)
     return Study(place, said.out, said.failed, scratch)
+
+
+def _scenes(command: str, given: Iterable[Scene]) -> list[Scene]:
+    """The scenes, of which there has to be one."""
+    from .scene import Scene
+
+    if not isinstance(given, Iterable):
+        raise StudyError(f"{command}: {given!r} is no list of scenes, or no scene. Give a list, as [scene].")
+    scenes = list(given)
+    for scene in scenes:
+        if not isinstance(scene, Scene):
+            raise StudyError(f"{command}: {scene!r} is no scene. Give a list of what load_file or load_dict returns.")
+    if not scenes:
+        raise StudyError(f"{command}: no scene is given. Give a list with one or more.")
+    return scenes
 
 
 def _stability_rows(report: dict[str, Any]) -> list[Row]:
@@ -173,5 +229,5 @@ def _option(name: str, value: object) -> list[str]:
     return [] if value is None else [f"{name}={value}"]
 
 
-def _each(name: str, values: Sequence[str]) -> list[str]:
-    return [f"{name}={value}" for value in values]
+def _each(name: str, values: Names) -> list[str]:
+    return [f"{name}={value}" for value in names(values, StudyError)]

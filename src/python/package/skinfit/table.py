@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Iterable, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any, overload
 
 Row = dict[str, Any]
+
+# Columns of names, which users give, and of settings.
+_WORDS = {"scene", "view", "left_out", "axis", "setting", "unit", "effects", "name"}
+# Python's own `int` and `float` take more, as `1_0`.
+_WHOLE = re.compile(r"[+-]?[0-9]+")
+_DECIMAL = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?|[+-]?inf|nan|NaN")
 
 
 class Table(Sequence[Row]):
@@ -72,20 +79,20 @@ def best(rows: Iterable[Row]) -> Any:
 
 
 def read_csv(file: Path) -> list[Row]:
-    """The rows of a file that the command line has left: numbers, `True`, `False`, `None` where it is empty, words."""
+    """The rows of a file that the command line has left: numbers, `True`, `False`, `None` where it is empty, words.
+    Columns of names and of settings are words, whatever they look like."""
     with file.open(newline="", encoding="utf-8") as lines:
-        return [{name: _read(text) for name, text in row.items()} for row in csv.DictReader(lines)]
+        return [{name: _read(name, text) for name, text in row.items()} for row in csv.DictReader(lines)]
 
 
-def _read(text: str) -> Any:
-    if text in ("", "true", "false"):
+def _read(column: str, text: str) -> Any:
+    if text in ("", "true", "false") and (column not in _WORDS or not text):
         return {"": None, "true": True, "false": False}[text]
-    for kind in (int, float):
-        try:
-            return kind(text)
-        except ValueError:
-            pass
-    return text
+    if column in _WORDS:
+        return text
+    if _WHOLE.fullmatch(text):
+        return int(text)
+    return float(text) if _DECIMAL.fullmatch(text) else text
 
 
 def _words(value: Any) -> str:
