@@ -146,6 +146,11 @@ impl Scene {
         Ok(params::set_freedom(&mut locked(&self.0.values), name, freedom)?)
     }
 
+    /// Have a fit move no parameter, those of effects that are off among them.
+    fn fix_all(&self) {
+        locked(&self.0.values).free.clear();
+    }
+
     /// Have a parameter stay within two numbers, or within the model's.
     #[pyo3(signature = (name, bounds = None))]
     fn set_bounds(&self, name: &str, bounds: Option<[f64; 2]>) -> PyResult<()> {
