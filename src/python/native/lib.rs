@@ -41,6 +41,8 @@ mod _native {
     #[pymodule_export]
     use crate::fitting::Fitting;
     #[pymodule_export]
+    use crate::free::Constants;
+    #[pymodule_export]
     use crate::maps::MapObjective;
     #[pymodule_export]
     use crate::objective::Objective;

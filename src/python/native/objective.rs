@@ -7,7 +7,7 @@ use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray3, PyUntypedArrayMethods,
 };
 use pyo3::types::{PyDict, PyDictMethods};
-use pyo3::{Bound, PyResult, Python, pyclass, pymethods};
+use pyo3::{Bound, Py, PyClassInitializer, PyResult, Python, pyclass, pymethods};
 use skinfit_core::engine::cpu::CpuEngine;
 use skinfit_core::engine::reference::{PixelColumns, Reference};
 use skinfit_core::engine::view::ObservedView;
@@ -16,16 +16,16 @@ use skinfit_core::prepare::Observed;
 
 use crate::arrays::numbers;
 use crate::errors::Refused;
-use crate::free::{Free, observe};
+use crate::free::{Constants, Free, observe};
 use crate::scene::Read;
 use crate::waiting::wait;
 
 /// The objective of a scene at the values that it had.
-#[pyclass(frozen, module = "skinfit._native")]
+#[pyclass(frozen, extends = Constants, module = "skinfit._native")]
 pub(crate) struct Objective(Arc<Observing>);
 
 struct Observing {
-    free: Free,
+    free: Arc<Free>,
     views: Arc<[ObservedView]>,
     engine: CpuEngine,
 }
@@ -36,11 +36,15 @@ type Take<'a> = &'a mut dyn FnMut(usize, f64, &[f64]);
 
 impl Objective {
     /// Of a scene as it stands, over the views that have a target and are not held out.
-    pub(crate) fn of(read: &Read, hold_out: &[String]) -> Result<Self, Refused> {
-        let observed = observe(read, hold_out, |_| Ok(()))?;
-        let engine = observed.engine()?;
-        let Observed { baked, views } = observed;
-        Ok(Self(Arc::new(Observing { free: Free::new(baked), views, engine })))
+    pub(crate) fn of(py: Python<'_>, read: Arc<Read>, hold_out: Vec<String>) -> PyResult<Py<Self>> {
+        let own = wait(py, move || {
+            let observed = observe(&read, &hold_out, |_| Ok(()))?;
+            let engine = observed.engine()?;
+            let Observed { baked, views } = observed;
+            Ok(Observing { free: Arc::new(Free::new(baked)), views, engine })
+        })?;
+        let constants = PyClassInitializer::from(Constants(Arc::clone(&own.free)));
+        Py::new(py, constants.add_subclass(Self(Arc::new(own))))
     }
 }
 
@@ -123,36 +127,6 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 #[pymethods]
 impl Objective {
-    /// The names of what is free, in the order of every vector.
-    #[getter]
-    fn names(&self) -> Vec<String> {
-        self.0.free.names.clone()
-    }
-
-    /// The views over which it is.
-    #[getter]
-    fn views(&self) -> Vec<String> {
-        self.0.free.views()
-    }
-
-    /// What the user should know.
-    #[getter]
-    fn warnings(&self) -> Vec<String> {
-        self.0.free.baked.warnings.clone()
-    }
-
-    /// The values that the scene had.
-    #[getter]
-    fn start<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.0.free.start(py)
-    }
-
-    /// Least and greatest value of each.
-    #[getter]
-    fn bounds(&self) -> Vec<(f64, f64)> {
-        self.0.free.bounds()
-    }
-
     /// The loss.
     fn loss(&self, py: Python<'_>, x: PyReadonlyArray1<'_, f64>) -> PyResult<f64> {
         let (own, x) = (Arc::clone(&self.0), numbers(&x));

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 
 use pyo3::types::PyDict;
-use pyo3::{Bound, PyResult, Python, pyclass, pymethods};
+use pyo3::{Bound, Py, PyResult, Python, pyclass, pymethods};
 use skinfit_core::model::effects::{Effect, Effects};
 use skinfit_core::prepare::{Loaded, PrepareOptions};
 use skinfit_core::scene::register_terms;
@@ -180,9 +180,8 @@ impl Scene {
     }
 
     /// The scene's fit as a function of what is free, over the views that have a target, but for those held out.
-    fn objective(&self, py: Python<'_>, hold_out: Vec<String>) -> PyResult<Objective> {
-        let read = Arc::clone(&self.0);
-        wait(py, move || Objective::of(&read, &hold_out))
+    fn objective(&self, py: Python<'_>, hold_out: Vec<String>) -> PyResult<Py<Objective>> {
+        Objective::of(py, Arc::clone(&self.0), hold_out)
     }
 
     /// The same as a function of whole maps, too, on a graphics adapter; part of its name may be given.
@@ -193,7 +192,7 @@ impl Scene {
         maps: Vec<String>,
         hold_out: Vec<String>,
         adapter: Option<String>,
-    ) -> PyResult<MapObjective> {
+    ) -> PyResult<Py<MapObjective>> {
         MapObjective::of(py, Arc::clone(&self.0), &maps, hold_out, adapter)
     }
 }

@@ -136,7 +136,7 @@ def test_a_fit_follows_at_once_on_one_that_was_interrupted_while_it_baked(demo_f
         # Between two steps, in a loop over what has a name and in one over what has none; then while a step is waited for.
         "steps = {steps}\n    for step in steps: print('step', flush=True); import time; time.sleep(60)",
         "for step in {steps}: print('step', flush=True); import time; time.sleep(60)",
-        "steps = {steps}\n    for step in steps: print('step', flush=True) if step.iteration == 1 else None",
+        "seen = []\n    for step in {steps}: seen or print('step', flush=True); seen.append(step)",
         "with {steps} as steps:\n        for step in steps: print('step', flush=True); import time; time.sleep(60)",
     ],
 )

@@ -5,8 +5,10 @@ from typing import Any, Literal, TypedDict, final
 
 import numpy as np
 from numpy.typing import NDArray
+from typing_extensions import disjoint_base
 
 __all__ = [
+    "Constants",
     "Fitting",
     "MapObjective",
     "Objective",
@@ -72,8 +74,8 @@ class Scene:
         self, maps: list[str], hold_out: list[str], adapter: str | None = None
     ) -> MapObjective: ...
 
-@final
-class Objective:
+@disjoint_base
+class Constants:
     @property
     def names(self) -> list[str]: ...
     @property
@@ -84,6 +86,9 @@ class Objective:
     def start(self) -> _Vector: ...
     @property
     def bounds(self) -> list[tuple[float, float]]: ...
+
+@final
+class Objective(Constants):
     def loss(self, x: _Vector) -> float: ...
     def loss_and_gradient(self, x: _Vector) -> tuple[float, _Vector]: ...
     def normal_equations(self, x: _Vector) -> dict[str, Any]: ...
@@ -92,17 +97,7 @@ class Objective:
     def vjp(self, x: _Vector, image: _Vector, view: str | None = None) -> _Vector: ...
 
 @final
-class MapObjective:
-    @property
-    def names(self) -> list[str]: ...
-    @property
-    def views(self) -> list[str]: ...
-    @property
-    def warnings(self) -> list[str]: ...
-    @property
-    def start(self) -> _Vector: ...
-    @property
-    def bounds(self) -> list[tuple[float, float]]: ...
+class MapObjective(Constants):
     @property
     def adapter(self) -> str: ...
     @property

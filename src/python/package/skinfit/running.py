@@ -20,7 +20,8 @@ class Running:
         self._stopped = False
         # The thread that has taken the last step.
         self._taker: int | None = None
-        _all.append(self)
+        with _lock:
+            _all.append(self)
 
     def taken(self) -> None:
         """This thread takes a step."""
@@ -39,12 +40,15 @@ class Running:
 
 
 _all: list[Running] = []
+_lock = threading.Lock()
 
 
 def make_way(folder: Path) -> None:
     """Wait for fits into a folder that were given up."""
     place = folder.resolve()
-    _all[:] = [running for running in _all if not running.native.is_over]
-    for running in [running for running in _all if running.gives_way(place)]:
+    with _lock:
+        _all[:] = [running for running in _all if not running.native.is_over]
+        given_up = [running for running in _all if running.gives_way(place)]
+    for running in given_up:
         running.stop()
         running.native.see_off(_PATIENCE)
