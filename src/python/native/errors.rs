@@ -11,6 +11,7 @@ use skinfit_gpu::painter::PaintError;
 import_exception!(skinfit.errors, ArrayError);
 import_exception!(skinfit.errors, BakeError);
 import_exception!(skinfit.errors, DeviceError);
+import_exception!(skinfit.errors, Error);
 import_exception!(skinfit.errors, Fault);
 import_exception!(skinfit.errors, FileError);
 import_exception!(skinfit.errors, FitError);
@@ -37,9 +38,12 @@ pub(crate) enum Refused {
     /// A file that cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
-    /// A fit or a scene file, in the command line's words.
+    /// A fit, in the command line's words as Python has them.
     #[error("{0}")]
     Fit(String),
+    /// A scene's file that cannot be written.
+    #[error("{0}")]
+    File(String),
     /// Effects that there are not.
     #[error("{0}")]
     Scene(String),
@@ -55,6 +59,12 @@ pub(crate) enum Refused {
     /// What an array has to be.
     #[error("{0}")]
     Array(String),
+    /// Work in a child of the process that had begun it.
+    #[error(
+        "this process was forked from one in which skinfit had begun to work, and has none of its threads. Start \
+         processes by `spawn`: multiprocessing.set_start_method(\"spawn\")."
+    )]
+    Forked,
     /// A panic.
     #[error("{0}. This is a fault of skinfit's: please report it.")]
     Fault(String),
@@ -62,19 +72,27 @@ pub(crate) enum Refused {
 
 impl From<Refused> for PyErr {
     fn from(refused: Refused) -> Self {
-        let words = refused.to_string();
-        match refused {
-            Refused::Prepare(error) => of_stage(&error, words),
-            Refused::Paint(_) | Refused::Samples(_) | Refused::Shading(_) | Refused::Scene(_) => {
+        refused.raised()
+    }
+}
+
+impl Refused {
+    /// What is raised; it may be so more than once.
+    pub(crate) fn raised(&self) -> PyErr {
+        let words = self.to_string();
+        match self {
+            Self::Prepare(error) => of_stage(error, words),
+            Self::Paint(_) | Self::Samples(_) | Self::Shading(_) | Self::Scene(_) => {
                 SceneError::new_err(words)
             }
-            Refused::Output(_) => FileError::new_err(words),
-            Refused::Fit(_) => FitError::new_err(words),
-            Refused::Param(_) => ParamError::new_err(words),
-            Refused::View(_) => ViewError::new_err(words),
-            Refused::Device(_) => DeviceError::new_err(words),
-            Refused::Array(_) => ArrayError::new_err(words),
-            Refused::Fault(_) => Fault::new_err(words),
+            Self::Output(_) | Self::File(_) => FileError::new_err(words),
+            Self::Fit(_) => FitError::new_err(words),
+            Self::Param(_) => ParamError::new_err(words),
+            Self::View(_) => ViewError::new_err(words),
+            Self::Device(_) => DeviceError::new_err(words),
+            Self::Array(_) => ArrayError::new_err(words),
+            Self::Forked => Error::new_err(words),
+            Self::Fault(_) => Fault::new_err(words),
         }
     }
 }

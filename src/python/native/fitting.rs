@@ -3,23 +3,22 @@
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
 
 use pyo3::types::{PyDict, PyDictMethods};
-use pyo3::{Bound, PyErr, PyRef, PyResult, Python, pyclass, pymethods};
+use pyo3::{Bound, PyRef, PyResult, Python, pyclass, pymethods};
 use skinfit_core::engine::Point;
 use skinfit_core::fit::outcome::Iteration;
 use skinfit_core::model::params::Param;
-use skinfit_core::prepare::scene_names;
-use skinfit_host::cli::CommandLine;
 use skinfit_host::contained::{Heard, contained};
-use skinfit_view::FitRequest;
-use skinfit_view::host::FitScene;
 
+use crate::asked::Asked;
 use crate::errors::Refused;
+use crate::fault::provoked;
 use crate::scene::Scene;
-use crate::waiting::{guarded, locked, next};
+use crate::waiting::{SLICE, begin, guarded, locked, not_forked};
 
 /// An iteration, and where it has led in each scene.
 struct Step {
@@ -37,7 +36,14 @@ enum Message {
 enum End {
     /// What the command line would have said.
     Done(Heard),
-    Refused(PyErr),
+    Refused(Refused),
+}
+
+/// What is heard of a fit within a slice.
+enum Next {
+    Step(Step),
+    Nothing,
+    Over,
 }
 
 /// A fit under way. Dropped, it stops soon.
@@ -59,28 +65,19 @@ type PyStep<'py> = (u64, u64, f64, f64, Vec<Bound<'py, PyDict>>);
 
 #[pymethods]
 impl Fitting {
-    /// Begin a fit of these scenes as one skin into the folder `run`, by further words of the command line; or go on with
-    /// the one that was stopped there.
+    /// Begin a fit of these scenes as one skin into the folder `run`, without the views that are held out, by further words
+    /// of the command line; or go on with the one that was stopped there.
     #[new]
-    #[pyo3(signature = (scenes, run, words, resume = false))]
-    fn new(scenes: Vec<PyRef<'_, Scene>>, run: PathBuf, words: Vec<String>, resume: bool) -> PyResult<Self> {
-        let paths: Vec<PathBuf> = scenes.iter().map(|scene| scene.0.path.clone()).collect();
-        let names = scene_names(&paths).map_err(Refused::from)?;
-        let asked = |(name, scene): (String, &PyRef<'_, Scene>)| FitScene {
-            name,
-            path: scene.0.path.clone(),
-            values: scene.0.values(),
-        };
-        let asked: Vec<FitScene> = names.into_iter().zip(&scenes).map(asked).collect();
-        let shown = asked.iter().map(|scene| scene.values.rows()).collect();
-        let cache = scenes.first().and_then(|scene| scene.0.cache.clone());
-        let kept = match &cache {
-            Some(cache) => vec!["--cache".to_owned(), cache.display().to_string()],
-            None => vec!["--no-cache".to_owned()],
-        };
-        let line = CommandLine { words: [kept, words].concat(), cache };
-        let request = FitRequest { scenes: asked, start: String::new(), run, resume };
-        begin(line, request, shown)
+    #[pyo3(signature = (scenes, run, words, hold_out, resume = false))]
+    fn new(
+        scenes: Vec<PyRef<'_, Scene>>,
+        run: PathBuf,
+        words: Vec<String>,
+        hold_out: Vec<String>,
+        resume: bool,
+    ) -> PyResult<Self> {
+        let reads = scenes.iter().map(|scene| Arc::clone(&scene.0)).collect();
+        fitting(Asked::new(reads, run, words, hold_out, resume)?)
     }
 
     /// Whether it ended.
@@ -91,28 +88,27 @@ impl Fitting {
 
     /// The next step; `None` when the fit is over. What a signal raises leaves it under way.
     fn next<'py>(&self, py: Python<'py>) -> PyResult<Option<PyStep<'py>>> {
-        if self.is_over() {
-            return Ok(None);
-        }
-        if self.waits.swap(false, Ordering::SeqCst)
-            && let Some(go_on) = &*locked(&self.go_on)
-        {
-            // It may have ended meanwhile.
-            let _ = go_on.send(());
-        }
-        match next(py, &self.messages)? {
-            Message::Step(step) => {
-                self.waits.store(true, Ordering::SeqCst);
-                Ok(Some(self.told(py, &step)?))
-            }
-            Message::Over(end) => {
-                *locked(&self.end) = Some(match *end {
-                    Ok(heard) => End::Done(heard),
-                    Err(refused) => End::Refused(refused.into()),
-                });
-                Ok(None)
+        not_forked()?;
+        loop {
+            match py.detach(|| self.hear()) {
+                Next::Step(step) => return self.told(py, &step).map(Some),
+                Next::Over => return self.ended().map(|_| None),
+                Next::Nothing => py.check_signals()?,
             }
         }
+    }
+
+    /// Wait until one that was stopped is over, but no longer than so many seconds: whether it is.
+    fn see_off(&self, py: Python<'_>, seconds: f64) -> PyResult<bool> {
+        not_forked()?;
+        let (begun, most) = (Instant::now(), Duration::try_from_secs_f64(seconds).unwrap_or_default());
+        while !matches!(py.detach(|| self.hear()), Next::Over) {
+            py.check_signals()?;
+            if begun.elapsed() > most {
+                return Ok(false);
+            }
+        }
+        Ok(true)
     }
 
     /// Have it end after the iteration that it is at, with what it has found.
@@ -125,15 +121,51 @@ impl Fitting {
     /// Go on to its end: what the command line would print, on standard output and on standard error.
     fn finish(&self, py: Python<'_>) -> PyResult<(Vec<String>, Vec<String>)> {
         while self.next(py)?.is_some() {}
-        match &*locked(&self.end) {
-            Some(End::Done(heard)) => Ok((heard.said.clone(), heard.told.clone())),
-            Some(End::Refused(error)) => Err(error.clone_ref(py)),
-            None => Ok((Vec::new(), Vec::new())),
-        }
+        self.ended()
     }
 }
 
 impl Fitting {
+    /// Have it go on where it waits, and hear of it. One thread at a time does: the one that takes the last word has kept
+    /// it before another can find that nobody is left to send.
+    fn hear(&self) -> Next {
+        let messages = locked(&self.messages);
+        if self.is_over() {
+            return Next::Over;
+        }
+        if self.waits.swap(false, Ordering::SeqCst)
+            && let Some(go_on) = &*locked(&self.go_on)
+        {
+            // It may have ended meanwhile.
+            let _ = go_on.send(());
+        }
+        let end = match messages.recv_timeout(SLICE) {
+            Ok(Message::Step(step)) => {
+                self.waits.store(true, Ordering::SeqCst);
+                return Next::Step(step);
+            }
+            Err(RecvTimeoutError::Timeout) => return Next::Nothing,
+            Ok(Message::Over(end)) => match *end {
+                Ok(heard) => End::Done(heard),
+                Err(refused) => End::Refused(refused),
+            },
+            Err(RecvTimeoutError::Disconnected) => {
+                End::Refused(Refused::Fault("the fit ended without a word".to_owned()))
+            }
+        };
+        *locked(&self.end) = Some(end);
+        Next::Over
+    }
+
+    /// What it said, on standard output and on standard error, or why it was refused.
+    fn ended(&self) -> PyResult<(Vec<String>, Vec<String>)> {
+        match &*locked(&self.end) {
+            Some(End::Done(heard)) => Ok((heard.said.clone(), heard.told.clone())),
+            Some(End::Refused(refused)) => Err(refused.raised()),
+            None => Ok((Vec::new(), Vec::new())),
+        }
+    }
+
     fn told<'py>(&self, py: Python<'py>, step: &Step) -> PyResult<PyStep<'py>> {
         let Iteration { iteration, evaluations, loss, seconds } = step.iteration;
         let constants = |(point, shown): (&Point, &Vec<Param>)| {
@@ -153,24 +185,22 @@ impl Drop for Fitting {
 }
 
 /// Begin a fit on a thread.
-fn begin(line: CommandLine, request: FitRequest, shown: Vec<Vec<Param>>) -> PyResult<Fitting> {
+fn fitting(asked: Asked) -> PyResult<Fitting> {
     let ((send, messages), (go_on, goes)) = (channel(), channel());
     let interrupt = Arc::new(AtomicBool::new(false));
-    let stop = Arc::clone(&interrupt);
+    let (stop, shown) = (Arc::clone(&interrupt), asked.shown());
     let work = move || {
         let mut watch = |iteration: &Iteration, points: &[Point]| {
+            provoked();
             let _ = send.send(Message::Step(Step { iteration: *iteration, points: points.to_vec() }));
             // Until it is to go on, or nobody is left to say so.
             let _ = goes.recv();
         };
-        let done = guarded(|| contained(|| line.fit(&request, &mut watch, &stop)));
-        let done = done.and_then(|(fitted, heard)| match fitted {
-            Ok(_) => Ok(heard),
-            Err(refusal) => Err(Refused::Fit(refusal.words().to_owned())),
-        });
+        let done = guarded(|| contained(|| asked.fit(&mut watch, &stop)));
+        let done = done.and_then(|(fitted, heard)| fitted.map(|()| heard));
         let _ = send.send(Message::Over(Box::new(done)));
     };
-    std::thread::Builder::new().name("skinfit fit".to_owned()).spawn(work)?;
+    begin("skinfit fit", work)?;
     Ok(Fitting {
         interrupt,
         messages: Mutex::new(messages),

@@ -1,7 +1,9 @@
 //! What is free of a scene's fit: names, bounds, and the points that vectors stand for.
 
+use std::sync::Arc;
+
 use numpy::PyArray1;
-use pyo3::{Bound, Python};
+use pyo3::{Bound, Python, pyclass, pymethods};
 use skinfit_core::engine::joint::label;
 use skinfit_core::engine::{Point, Unknown};
 use skinfit_core::prepare::{Baked, NamedScene, Observed, PrepareError, untied};
@@ -68,21 +70,10 @@ impl Free {
         Ok(point)
     }
 
-    /// The values that the scene had.
-    pub(crate) fn start<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        let start = self.baked.start();
-        PyArray1::from_vec(py, self.unknowns.iter().map(|unknown| unknown.get(&start)).collect())
-    }
-
     /// Least and greatest value of each.
     pub(crate) fn bounds(&self) -> Vec<(f64, f64)> {
         let within = std::slice::from_ref(&self.baked.scene.fit.bounds);
         self.unknowns.iter().map(|unknown| unknown.bounds_within(within)).collect()
-    }
-
-    /// The names of the views.
-    pub(crate) fn views(&self) -> Vec<String> {
-        self.baked.scene.views.iter().map(|view| view.name.clone()).collect()
     }
 
     /// The number of a view; the first's where none is named.
@@ -116,5 +107,43 @@ impl Free {
         Err(Refused::Array(format!(
             "an array of {shape:?}, where the view has {height} x {width} pixels of three numbers."
         )))
+    }
+}
+
+/// What the functions of what is free have in common.
+#[pyclass(frozen, subclass, module = "skinfit._native")]
+pub(crate) struct Constants(pub(crate) Arc<Free>);
+
+#[pymethods]
+impl Constants {
+    /// The names of what is free, in the order of every vector.
+    #[getter]
+    fn names(&self) -> Vec<String> {
+        self.0.names.clone()
+    }
+
+    /// The views over which it is.
+    #[getter]
+    fn views(&self) -> Vec<String> {
+        self.0.baked.scene.views.iter().map(|view| view.name.clone()).collect()
+    }
+
+    /// What the user should know.
+    #[getter]
+    fn warnings(&self) -> Vec<String> {
+        self.0.baked.warnings.clone()
+    }
+
+    /// The values that the scene had.
+    #[getter]
+    fn start<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let start = self.0.baked.start();
+        PyArray1::from_vec(py, self.0.unknowns.iter().map(|unknown| unknown.get(&start)).collect())
+    }
+
+    /// Least and greatest value of each.
+    #[getter]
+    fn bounds(&self) -> Vec<(f64, f64)> {
+        self.0.bounds()
     }
 }

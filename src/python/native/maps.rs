@@ -8,13 +8,13 @@ use numpy::{
     PyUntypedArrayMethods as _,
 };
 use pyo3::types::{PyAnyMethods as _, PyDict, PyDictMethods as _};
-use pyo3::{Bound, PyResult, Python, pyclass, pymethods};
+use pyo3::{Bound, Py, PyClassInitializer, PyResult, Python, pyclass, pymethods};
 use skinfit_core::prepare::Observed;
 use skinfit_core::scene::{MapKind, suggestion};
 
 use crate::arrays::numbers;
 use crate::errors::Refused;
-use crate::free::{Free, observe};
+use crate::free::{Constants, Free, observe};
 use crate::scene::Read;
 use crate::tensors::Function;
 use crate::waiting::wait;
@@ -33,7 +33,7 @@ pub(crate) type GivenMaps = Vec<Option<Vec<f32>>>;
 pub(crate) type Gradients = (Vec<f64>, Vec<Vec<f32>>);
 
 /// The objective of a scene at the values that it had, over maps as well.
-#[pyclass(frozen, module = "skinfit._native")]
+#[pyclass(frozen, extends = Constants, module = "skinfit._native")]
 pub(crate) struct MapObjective {
     free: Arc<Free>,
     function: Function,
@@ -47,7 +47,7 @@ impl MapObjective {
         maps: &[String],
         hold_out: Vec<String>,
         adapter: Option<String>,
-    ) -> PyResult<Self> {
+    ) -> PyResult<Py<Self>> {
         let path = read.path.clone();
         let kinds: Vec<MapKind> = maps.iter().map(|name| kind(name)).collect::<Result<_, _>>()?;
         let of = kinds.clone();
@@ -59,7 +59,8 @@ impl MapObjective {
         let Observed { baked, views } = observed;
         let free = Arc::new(Free::new(baked));
         let function = Function::new(py, &free, views, kinds, adapter)?;
-        Ok(Self { free, function })
+        let constants = PyClassInitializer::from(Constants(Arc::clone(&free)));
+        Py::new(py, constants.add_subclass(Self { free, function }))
     }
 
     /// The maps of a dictionary.
@@ -108,36 +109,6 @@ fn kind(name: &str) -> Result<MapKind, Refused> {
 
 #[pymethods]
 impl MapObjective {
-    /// The names of what is free, in the order of every vector.
-    #[getter]
-    fn names(&self) -> Vec<String> {
-        self.free.names.clone()
-    }
-
-    /// The views over which it is.
-    #[getter]
-    fn views(&self) -> Vec<String> {
-        self.free.views()
-    }
-
-    /// What the user should know.
-    #[getter]
-    fn warnings(&self) -> Vec<String> {
-        self.free.baked.warnings.clone()
-    }
-
-    /// The values that the scene had.
-    #[getter]
-    fn start<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.free.start(py)
-    }
-
-    /// Least and greatest value of each.
-    #[getter]
-    fn bounds(&self) -> Vec<(f64, f64)> {
-        self.free.bounds()
-    }
-
     /// The adapter's name.
     #[getter]
     fn adapter(&self) -> &str {

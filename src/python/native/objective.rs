@@ -7,25 +7,25 @@ use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray3, PyUntypedArrayMethods,
 };
 use pyo3::types::{PyDict, PyDictMethods};
-use pyo3::{Bound, PyResult, Python, pyclass, pymethods};
+use pyo3::{Bound, Py, PyClassInitializer, PyResult, Python, pyclass, pymethods};
 use skinfit_core::engine::cpu::CpuEngine;
 use skinfit_core::engine::reference::{PixelColumns, Reference};
 use skinfit_core::engine::view::ObservedView;
-use skinfit_core::engine::{NormalEquations, Objective as _};
+use skinfit_core::engine::{NormalEquations, Objective as _, Unknown};
 use skinfit_core::prepare::Observed;
 
 use crate::arrays::numbers;
 use crate::errors::Refused;
-use crate::free::{Free, observe};
+use crate::free::{Constants, Free, observe};
 use crate::scene::Read;
 use crate::waiting::wait;
 
 /// The objective of a scene at the values that it had.
-#[pyclass(frozen, module = "skinfit._native")]
+#[pyclass(frozen, extends = Constants, module = "skinfit._native")]
 pub(crate) struct Objective(Arc<Observing>);
 
 struct Observing {
-    free: Free,
+    free: Arc<Free>,
     views: Arc<[ObservedView]>,
     engine: CpuEngine,
 }
@@ -36,18 +36,23 @@ type Take<'a> = &'a mut dyn FnMut(usize, f64, &[f64]);
 
 impl Objective {
     /// Of a scene as it stands, over the views that have a target and are not held out.
-    pub(crate) fn of(read: &Read, hold_out: &[String]) -> Result<Self, Refused> {
-        let observed = observe(read, hold_out, |_| Ok(()))?;
-        let engine = observed.engine()?;
-        let Observed { baked, views } = observed;
-        Ok(Self(Arc::new(Observing { free: Free::new(baked), views, engine })))
+    pub(crate) fn of(py: Python<'_>, read: Arc<Read>, hold_out: Vec<String>) -> PyResult<Py<Self>> {
+        let own = wait(py, move || {
+            let observed = observe(&read, &hold_out, |_| Ok(()))?;
+            let engine = observed.engine()?;
+            let Observed { baked, views } = observed;
+            Ok(Observing { free: Arc::new(Free::new(baked)), views, engine })
+        })?;
+        let constants = PyClassInitializer::from(Constants(Arc::clone(&own.free)));
+        Py::new(py, constants.add_subclass(Self(Arc::new(own))))
     }
 }
 
 impl Observing {
-    /// Have `take` see each pixel and channel of a view: radiance premultiplied by the coverage, times the gain.
-    fn rows(&self, x: &[f64], view: usize, take: Take<'_>) -> Result<(), Refused> {
-        let Free { baked, unknowns, .. } = &self.free;
+    /// Have `take` see each pixel and channel of a view: radiance premultiplied by the coverage, times the gain. Rows have a
+    /// number for each of `unknowns`.
+    fn rows(&self, x: &[f64], view: usize, unknowns: &[Unknown], take: Take<'_>) -> Result<(), Refused> {
+        let baked = &self.free.baked;
         let point = self.free.at(x)?;
         let (light, loss) = (&baked.illumination, baked.scene.fit.loss);
         let reference = Reference::new(baked.setup(), light, &self.views, loss, unknowns)?;
@@ -77,20 +82,28 @@ impl Observing {
         &self,
         x: &[f64],
         view: Option<&str>,
+        unknowns: &[Unknown],
         of: impl Fn(f64, &[f64]) -> f64,
     ) -> Result<Plane, Refused> {
         let view = self.free.view(view)?;
         let size = self.free.size(view);
         let mut numbers = vec![0.0; 3 * size[0] * size[1]];
-        self.rows(x, view, &mut |place, value, row| numbers[place] = of(value, row))?;
+        self.rows(x, view, unknowns, &mut |place, value, row| numbers[place] = of(value, row))?;
         Ok(Plane { numbers, size })
     }
 
-    fn length(&self, v: &[f64]) -> Result<(), Refused> {
+    /// Refuse what is no direction in which constants move.
+    fn check_direction(&self, v: &[f64]) -> Result<(), Refused> {
         let (given, wanted) = (v.len(), self.free.names.len());
-        match given == wanted {
-            true => Ok(()),
-            false => Err(Refused::Array(format!("a vector of {given}, where {wanted} constants are free."))),
+        if given != wanted {
+            return Err(Refused::Array(format!("a vector of {given}, where {wanted} constants are free.")));
+        }
+        match v.iter().position(|number| !number.is_finite()) {
+            None => Ok(()),
+            Some(place) => Err(Refused::Array(format!(
+                "the vector moves {} by {}. Give finite numbers.",
+                self.free.names[place], v[place]
+            ))),
         }
     }
 }
@@ -114,36 +127,6 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 #[pymethods]
 impl Objective {
-    /// The names of what is free, in the order of every vector.
-    #[getter]
-    fn names(&self) -> Vec<String> {
-        self.0.free.names.clone()
-    }
-
-    /// The views over which it is.
-    #[getter]
-    fn views(&self) -> Vec<String> {
-        self.0.free.views()
-    }
-
-    /// What the user should know.
-    #[getter]
-    fn warnings(&self) -> Vec<String> {
-        self.0.free.baked.warnings.clone()
-    }
-
-    /// The values that the scene had.
-    #[getter]
-    fn start<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.0.free.start(py)
-    }
-
-    /// Least and greatest value of each.
-    #[getter]
-    fn bounds(&self) -> Vec<(f64, f64)> {
-        self.0.free.bounds()
-    }
-
     /// The loss.
     fn loss(&self, py: Python<'_>, x: PyReadonlyArray1<'_, f64>) -> PyResult<f64> {
         let (own, x) = (Arc::clone(&self.0), numbers(&x));
@@ -189,7 +172,7 @@ impl Objective {
         view: Option<String>,
     ) -> PyResult<Bound<'py, PyArray3<f64>>> {
         let (own, x) = (Arc::clone(&self.0), numbers(&x));
-        wait(py, move || own.image(&x, view.as_deref(), |value, _| value))?.array(py)
+        wait(py, move || own.image(&x, view.as_deref(), &[], |value, _| value))?.array(py)
     }
 
     /// The Jacobian of a view's image times a vector.
@@ -203,8 +186,8 @@ impl Objective {
     ) -> PyResult<Bound<'py, PyArray3<f64>>> {
         let (own, x, v) = (Arc::clone(&self.0), numbers(&x), numbers(&v));
         let product = move || {
-            own.length(&v)?;
-            own.image(&x, view.as_deref(), |_, row| dot(row, &v))
+            own.check_direction(&v)?;
+            own.image(&x, view.as_deref(), &own.free.unknowns, |_, row| dot(row, &v))
         };
         wait(py, product)?.array(py)
     }
@@ -223,7 +206,7 @@ impl Objective {
         let product = move || {
             let view = own.free.view_of_image(view.as_deref(), &shape)?;
             let mut sums = vec![0.0; own.free.names.len()];
-            own.rows(&x, view, &mut |place, _, row| {
+            own.rows(&x, view, &own.free.unknowns, &mut |place, _, row| {
                 sums.iter_mut().zip(row).for_each(|(sum, slope)| *sum += image[place] * slope);
             })?;
             Ok(sums)

@@ -5,12 +5,12 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 
 use pyo3::types::PyDict;
-use pyo3::{Bound, PyResult, Python, pyclass, pymethods};
+use pyo3::{Bound, Py, PyResult, Python, pyclass, pymethods};
 use skinfit_core::model::effects::{Effect, Effects};
 use skinfit_core::prepare::{Loaded, PrepareOptions};
 use skinfit_core::scene::register_terms;
 use skinfit_core::scene::view::Background;
-use skinfit_host::cli::{parse_effects, save_scene};
+use skinfit_host::cli::{Refusal, parse_effects, save_scene};
 use skinfit_view::values::Values;
 
 use crate::errors::Refused;
@@ -18,7 +18,7 @@ use crate::maps::MapObjective;
 use crate::objective::Objective;
 use crate::paint::{self, Painted};
 use crate::params;
-use crate::waiting::{locked, wait};
+use crate::waiting::{here, locked, wait};
 
 /// A scene, shared with the threads that work for it.
 #[pyclass(frozen, module = "skinfit._native")]
@@ -122,12 +122,12 @@ impl Scene {
 
     /// The rows of the parameter table.
     fn rows<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        params::rows(py, &self.0.values())
+        here(|| params::rows(py, &self.0.values()))
     }
 
     /// The row of one parameter.
     fn row<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyDict>> {
-        params::row_of(py, &self.0.values(), name)
+        here(|| params::row_of(py, &self.0.values(), name))
     }
 
     /// The names of what a fit moves.
@@ -138,25 +138,30 @@ impl Scene {
 
     /// Set a parameter to one number, or to three.
     fn set(&self, name: &str, numbers: Vec<f64>) -> PyResult<()> {
-        Ok(params::set(&mut locked(&self.0.values), name, &numbers)?)
+        here(|| params::set(&mut locked(&self.0.values), name, &numbers))
     }
 
     /// Say what a fit may do to a parameter: `fixed`, `tied` or `per_channel`.
     fn set_freedom(&self, name: &str, freedom: &str) -> PyResult<()> {
-        Ok(params::set_freedom(&mut locked(&self.0.values), name, freedom)?)
+        here(|| params::set_freedom(&mut locked(&self.0.values), name, freedom))
+    }
+
+    /// Have a fit move no parameter, those of effects that are off among them.
+    fn fix_all(&self) {
+        locked(&self.0.values).free.clear();
     }
 
     /// Have a parameter stay within two numbers, or within the model's.
     #[pyo3(signature = (name, bounds = None))]
     fn set_bounds(&self, name: &str, bounds: Option<[f64; 2]>) -> PyResult<()> {
-        Ok(params::set_bounds(&mut locked(&self.0.values), name, bounds)?)
+        here(|| params::set_bounds(&mut locked(&self.0.values), name, bounds))
     }
 
     /// Write the scene with its values as a file, with absolute paths.
     fn save(&self, py: Python<'_>, file: PathBuf) -> PyResult<()> {
         let read = Arc::clone(&self.0);
         wait(py, move || {
-            let words = |refusal: skinfit_host::cli::Refusal| Refused::Fit(refusal.words().to_owned());
+            let words = |refusal: Refusal| Refused::File(refusal.words().to_owned());
             save_scene(&read.path, &read.values(), &file).map_err(words)
         })
     }
@@ -175,9 +180,8 @@ impl Scene {
     }
 
     /// The scene's fit as a function of what is free, over the views that have a target, but for those held out.
-    fn objective(&self, py: Python<'_>, hold_out: Vec<String>) -> PyResult<Objective> {
-        let read = Arc::clone(&self.0);
-        wait(py, move || Objective::of(&read, &hold_out))
+    fn objective(&self, py: Python<'_>, hold_out: Vec<String>) -> PyResult<Py<Objective>> {
+        Objective::of(py, Arc::clone(&self.0), hold_out)
     }
 
     /// The same as a function of whole maps, too, on a graphics adapter; part of its name may be given.
@@ -188,7 +192,7 @@ impl Scene {
         maps: Vec<String>,
         hold_out: Vec<String>,
         adapter: Option<String>,
-    ) -> PyResult<MapObjective> {
+    ) -> PyResult<Py<MapObjective>> {
         MapObjective::of(py, Arc::clone(&self.0), &maps, hold_out, adapter)
     }
 }

@@ -19,7 +19,7 @@ use skinfit_tensor::{SharedDevice, TensorError};
 use crate::errors::Refused;
 use crate::free::Free;
 use crate::maps::{GivenMaps, Gradients, Map};
-use crate::waiting::{guarded, locked, next};
+use crate::waiting::{begin, guarded, locked, next, not_forked};
 
 /// A function, shared with the thread.
 pub(crate) struct Function {
@@ -173,6 +173,7 @@ fn there<T: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce(&mut Adapters) -> Result<T, Refused> + Send + 'static,
 ) -> PyResult<T> {
+    not_forked()?;
     let (send, receive) = channel();
     let job = move |adapters: &mut Adapters| {
         // Who waited may be gone.
@@ -193,7 +194,7 @@ fn thread() -> PyResult<Sender<Job>> {
         let mut adapters = Adapters::default();
         receive.iter().for_each(|job| job(&mut adapters));
     };
-    std::thread::Builder::new().name("skinfit tensors".to_owned()).spawn(run)?;
+    begin("skinfit tensors", run)?;
     *thread = Some(jobs.clone());
     Ok(jobs)
 }

@@ -3,7 +3,7 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
 use pyo3::{PyErr, PyResult, Python};
@@ -11,7 +11,7 @@ use pyo3::{PyErr, PyResult, Python};
 use crate::errors::{Fault, Refused};
 
 /// How long Ctrl-C may go unheard.
-const SLICE: Duration = Duration::from_millis(50);
+pub(crate) const SLICE: Duration = Duration::from_millis(50);
 
 /// What a lock holds: no thread leaves it half changed.
 pub(crate) fn locked<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -25,6 +25,27 @@ pub(crate) fn guarded<T>(work: impl FnOnce() -> T) -> Result<T, Refused> {
         let words = words.or_else(|| panic.downcast_ref::<&str>().map(|&words| words.to_owned()));
         Refused::Fault(words.unwrap_or_default())
     })
+}
+
+/// Do some work at once, where it is quick.
+pub(crate) fn here<T, E: Into<PyErr>>(work: impl FnOnce() -> Result<T, E>) -> PyResult<T> {
+    guarded(work)?.map_err(Into::into)
+}
+
+/// The process in which work has begun.
+static PROCESS: OnceLock<u32> = OnceLock::new();
+
+/// Refuse to wait for threads that a fork has left behind.
+pub(crate) fn not_forked() -> Result<(), Refused> {
+    let own = std::process::id();
+    if *PROCESS.get_or_init(|| own) == own { Ok(()) } else { Err(Refused::Forked) }
+}
+
+/// Begin some work on a thread of its own.
+pub(crate) fn begin(name: &str, work: impl FnOnce() + Send + 'static) -> PyResult<()> {
+    not_forked()?;
+    std::thread::Builder::new().name(name.to_owned()).spawn(work)?;
+    Ok(())
 }
 
 /// The next that `messages` brings. Python goes on meanwhile.
@@ -53,6 +74,6 @@ pub(crate) fn wait<T: Send + 'static>(
         // Who waited may be gone.
         let _ = send.send(guarded(work));
     };
-    std::thread::Builder::new().name("skinfit".to_owned()).spawn(run)?;
+    begin("skinfit", run)?;
     next(py, &Mutex::new(receive))?.flatten().map_err(PyErr::from)
 }

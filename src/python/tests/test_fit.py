@@ -1,16 +1,16 @@
 """Fits are the command line's to the bit; they can be watched, stopped and resumed."""
 
-import signal
-import subprocess
+import pickle
 import sys
-import textwrap
 import threading
 import time
+import types
 from pathlib import Path
 
 import numpy as np
 import pytest
 import skinfit
+from skinfit.progress import _in_notebook
 
 from conftest import Program, numbers, report_of
 
@@ -79,7 +79,7 @@ def test_held_out_views_are_scored_and_not_fitted(small: skinfit.Scene) -> None:
     found = small.fit(engine="cpu", hold_out=["side"])
     assert list(found.held_out) == ["side"]
     assert not found.scores["front"].held_out
-    with pytest.raises(skinfit.FitError, match="nobody"):
+    with pytest.raises(skinfit.ViewError, match="nobody"):
         small.fit(hold_out=["nobody"])
 
 
@@ -94,6 +94,98 @@ def test_each_step_is_told_and_false_stops(small: skinfit.Scene) -> None:
         found = small.fit(watch, engine="cpu")
     assert found.ending == "interrupted" and len(steps) == 2
     assert set(steps[0].constants) == set(small.params)
+
+
+def test_numpys_false_stops_and_nothing_does_not(small: skinfit.Scene, unwarned: None) -> None:
+    assert small.fit(lambda step: np.False_, engine="cpu").ending == "interrupted"
+    assert small.fit(lambda step: None, engine="cpu").converged
+
+
+def test_a_refusal_is_raised_by_whoever_asks_for_steps(small: skinfit.Scene, tmp_path: Path) -> None:
+    with pytest.raises(skinfit.ViewError, match="nobody"):
+        list(small.fit_steps(hold_out=["nobody"]))
+    steps = small.fit_steps(engine="cpu", device_memory=1)
+    for _ in range(2):
+        with pytest.raises(skinfit.FitError, match="device_memory"):
+            next(steps)
+    with pytest.raises(skinfit.FitError, match="device_memory"):
+        steps.result()
+
+
+def test_a_folder_without_a_name_is_refused(small: skinfit.Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(skinfit.FitError, match="names no folder"):
+        small.fit(run="")
+    assert not list(tmp_path.iterdir())
+
+
+def test_fitted_gains_are_those_of_the_images(small_file: Path, cache: Path) -> None:
+    file = small_file.with_name("gains.toml")
+    file.write_text(small_file.read_text(encoding="utf-8").replace("[fit]\n", "[fit]\ngains = true\n"), encoding="utf-8")
+    looks = skinfit.load_file(file, cache=cache)
+    f = looks.objective()
+    found = looks.fit(engine="cpu")
+    assert list(found.gains) == ["front", "side"] and found.gains["front"] == 1.0
+    assert found.gains["side"] == found.report["unknowns"][f.names.index("gain.side")]["value"]
+    looks.params.set_all(found.params)
+    side = looks.render("side")
+    x = [unknown["value"] for unknown in found.report["unknowns"]]
+    assert np.allclose(side.image * found.gains["side"], f.image(x, "side"), atol=1e-5)
+
+
+def test_gains_of_channels_are_three_numbers(fitted: skinfit.Fit, tmp_path: Path) -> None:
+    again = skinfit.load_run(fitted.save(tmp_path / "kept"))
+    channels = [{"name": f"gain.profile.{channel}", "value": value} for channel, value in [("r", 1.5), ("g", 1.0), ("b", 0.5)]]
+    again.report["unknowns"] = channels
+    assert again.gains == {"front": 1.0, "three_quarter": 1.0, "profile": (1.5, 1.0, 0.5)}
+
+
+def test_a_fit_is_pickled_by_its_folder(small: skinfit.Scene, tmp_path: Path) -> None:
+    found = small.fit(engine="cpu", run=tmp_path / "run")
+    again = pickle.loads(pickle.dumps(found))
+    assert again.params == found.params and again.run == found.run
+    with pytest.raises(TypeError, match="Save it first"):
+        pickle.dumps(small.fit(engine="cpu"))
+
+
+def test_a_fit_that_is_left_stops_and_frees_its_folder(small: skinfit.Scene, tmp_path: Path, unwarned: None) -> None:
+    with small.fit_steps(run=tmp_path / "run", engine="cpu") as steps:
+        next(steps)
+    assert steps.result().ending == "interrupted"
+    # One that nobody holds any more.
+    next(small.fit_steps(run=tmp_path / "run", engine="cpu"))
+    # One that this thread has left between two steps.
+    left = small.fit_steps(run=tmp_path / "run", engine="cpu")
+    next(left)
+    assert small.fit(run=tmp_path / "run", engine="cpu").converged
+    # One that is wanted is in the way.
+    wanted = small.fit_steps(run=tmp_path / "run", engine="cpu")
+    thread = threading.Thread(target=lambda: next(wanted))
+    thread.start()
+    thread.join()
+    with pytest.raises(skinfit.FitError, match="another run is writing"):
+        small.fit(run=tmp_path / "run", engine="cpu")
+    assert wanted.result().converged
+
+
+def test_progress_is_shown_from_the_beginning(small: skinfit.Scene, capsys: pytest.CaptureFixture[str]) -> None:
+    small.fit(engine="cpu", progress=True)
+    lines = capsys.readouterr().err.split("\r")
+    assert "read, baked and sampled" in lines[1] and "iterations" in lines[2]
+
+
+def test_colabs_shell_is_a_notebooks(monkeypatch: pytest.MonkeyPatch) -> None:
+    class ZMQInteractiveShell:
+        pass
+
+    class Shell(ZMQInteractiveShell):
+        pass
+
+    ipython = types.ModuleType("IPython")
+    monkeypatch.setitem(sys.modules, "IPython", ipython)
+    for shell, shown in [(Shell(), True), (ZMQInteractiveShell(), True), (None, False), (object(), False)]:
+        monkeypatch.setattr(ipython, "get_ipython", lambda shell=shell: shell, raising=False)
+        assert _in_notebook() is shown
 
 
 def test_a_stopped_fit_goes_on_to_the_same_bits(small: skinfit.Scene, tmp_path: Path, unwarned: None) -> None:
@@ -159,58 +251,3 @@ def test_other_threads_go_on_while_a_fit_runs(scene: skinfit.Scene) -> None:
     thread.join()
     # A lock that is held lets it tick in between alone, some tens of times.
     assert ticks > 50 * seconds, (ticks, seconds)
-
-
-# Of what a shell runs in the background Ctrl-C is ignored, until somebody says otherwise.
-_HEARD = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-
-_INTERRUPTED = """
-    import sys, time, warnings
-    import skinfit
-    warnings.simplefilter("ignore")
-    scene = skinfit.load_file({scene!r}, cache={cache!r})
-    def watch(step):
-        print("step", flush=True)
-        time.sleep(0.2)
-    found = scene.fit(watch, engine="cpu", solver="nelder-mead", run={run!r})
-    print(found.ending, len(found.history), flush=True)
-"""
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="there is no such signal")
-def test_ctrl_c_keeps_what_there_is(small_file: Path, cache: Path, tmp_path: Path) -> None:
-    script = textwrap.dedent(_INTERRUPTED.format(scene=str(small_file), cache=str(cache), run=str(tmp_path / "run")))
-    with subprocess.Popen([sys.executable, "-c", _HEARD + script], stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
-        assert process.stdout.readline() == "step\n"
-        process.send_signal(signal.SIGINT)
-        told = process.stdout.read().split()
-    assert process.returncode == 0
-    # It stopped at once, not after its hundreds of steps.
-    assert told.count("step") <= 1 and told[-2] == "interrupted"
-    assert skinfit.load_run(tmp_path / "run").ending == "interrupted"
-
-
-_AT_WORK = """
-    import time
-    import skinfit
-    f = skinfit.load_file({scene!r}, cache={cache!r}).objective()
-    print("begun", flush=True)
-    try:
-        while True:
-            f.image(f.start)
-    except KeyboardInterrupt:
-        print("interrupted", time.time(), flush=True)
-"""
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="there is no such signal")
-def test_ctrl_c_is_heard_within_a_second_while_the_library_works(demo_file: Path, cache: Path) -> None:
-    script = textwrap.dedent(_AT_WORK.format(scene=str(demo_file), cache=str(cache)))
-    with subprocess.Popen([sys.executable, "-c", _HEARD + script], stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None and process.stdout.readline() == "begun\n"
-        time.sleep(0.5)
-        sent = time.time()
-        process.send_signal(signal.SIGINT)
-        word, heard = process.stdout.readline().split()
-        assert word == "interrupted" and float(heard) - sent < 1.0

@@ -34,10 +34,11 @@ from .errors import (  # noqa: E402
     StudyError,
     ViewError,
 )
-from .fit import Fit, FitOptions, FitSteps, Iteration, Scores, Step, fit, fit_steps, load_run  # noqa: E402
+from .fit import Fit, FitSteps, Iteration, Scores, Step, fit, fit_steps, load_run  # noqa: E402
 from .loading import demo, load_dict  # noqa: E402
 from .maps import MapGradients, MapObjective  # noqa: E402
 from .objective import NormalEquations, Objective  # noqa: E402
+from .options import FitOptions  # noqa: E402
 from .page import Page  # noqa: E402
 from .params import ParamInfo, Params  # noqa: E402
 from .rendering import Rendering  # noqa: E402

@@ -44,7 +44,7 @@ def main() -> NoReturn:
 
 
 def run(words: Sequence[str], refused: type[Error]) -> Said:
-    """Run the program on these words. Raises `refused`, with the program's paragraph, where it refuses its input."""
+    """Run the program on these words. Raises `refused`, with the program's paragraph in Python's words, where it refuses its input."""
     command = [sys.executable, "-m", "skinfit", *words]
     with subprocess.Popen(
         command, env=_environment(), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE
@@ -56,7 +56,8 @@ def run(words: Sequence[str], refused: type[Error]) -> Said:
             raise
     told = [line.removeprefix(_NAME) for line in err.splitlines() if line]
     if process.returncode not in (0, 1):
-        raise refused("\n".join(told) or f"skinfit ended with exit code {process.returncode}.")
+        words = _native.in_python("\n".join(told))
+        raise refused(words or f"skinfit ended with exit code {process.returncode}.")
     return Said(process.returncode == 1, out, told)
 
 

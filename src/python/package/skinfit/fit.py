@@ -7,27 +7,30 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import tempfile
 import threading
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypedDict, Union
+from typing import TYPE_CHECKING, Any, Literal, Union
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import _native
 from .command import run as run_command
-from .errors import FitError, SkinfitWarning
+from .errors import Error, FitError, SkinfitWarning
 from .html import framed
+from .options import FitOptions, names_of, words_of
 from .page import Page
 from .page import write as write_page
 from .params import Value
 from .progress import Progress
+from .running import Running, make_way
 from .scratch import stays
 from .study import copy
 from .table import best
@@ -39,30 +42,6 @@ if TYPE_CHECKING:
 
 FilePath = Union[str, "PathLike[str]"]
 Ending = Literal["converged", "ran-out", "stalled", "interrupted"]
-
-
-class FitOptions(TypedDict, total=False):
-    """How a fit goes about it; what is not given is as of `skinfit fit`."""
-
-    solver: Literal["varpro", "lm", "lbfgs", "nelder-mead", "adam"]
-    loss: Literal["l2", "relative_l2", "huber", "smape"]
-    """Instead of the scenes' own."""
-    starts: int
-    """Fit from this many starts and keep the best."""
-    seed: int
-    """What the other starts are drawn from."""
-    max_iterations: int
-    """Of each start."""
-    engine: Literal["auto", "cpu", "gpu"]
-    """What makes the passes."""
-    samples: Literal["cpu", "gpu"]
-    """What makes the GPU engine's samples."""
-    adapter: str
-    """Part of a graphics adapter's name."""
-    device_memory: int
-    """Most megabytes of samples that stay on the adapter."""
-    verify: bool
-    """Hold the first pass against the model in f64."""
 
 
 @dataclass(frozen=True)
@@ -148,6 +127,13 @@ class Fit:
         """The value of each parameter that was free: `scene.params.set_all(fit.params)` takes them over. Of several scenes,
         what each has of its own is named `SCENE/NAME`."""
         return {name: _value(param["value"]) for name, param in self.report["params"].items()}
+
+    @property
+    def gains(self) -> dict[str, Value]:
+        """The factor on each view's image, which is 1 unless the scene frees gains: `scene.render(view).image * fit.gains[view]`
+        is the image that was fitted. `Fit.params` has none of these."""
+        found = {unknown["name"]: float(unknown["value"]) for unknown in self.report["unknowns"]}
+        return {view: _gain(view, found) for view in self.report["views"]}
 
     @property
     def std_errors(self) -> dict[str, float | None]:
@@ -238,6 +224,12 @@ class Fit:
         words = [str(self.run), *cache, *([] if title is None else [f"--title={title}"])]
         return write_page(words, place, player, self._scratch)
 
+    def __reduce__(self) -> tuple[Callable[[FilePath], Fit], tuple[Path]]:
+        """Pickled by its run folder, which has to be there where it is read again."""
+        if self._scratch is not None:
+            raise TypeError("this fit's folder goes with it, so it cannot be pickled. Save it first: load_run(fit.save(folder)).")
+        return load_run, (self.run.absolute(),)
+
     def __repr__(self) -> str:
         if self._text:
             return self._text
@@ -249,13 +241,21 @@ class Fit:
 
 
 class FitSteps(Iterator[Step]):
-    """A fit under way, which waits after each step for the next one to be asked for.
+    """A fit under way, which waits after each step for the next one to be asked for. Whoever leaves the loop early asks for
+    `result()`, for which the fit goes on to its end, or stops it before.
 
-    Whoever leaves the loop early asks for `result()`: the fit goes on to its end by itself, unless `stop()` was called.
+    Ctrl-C while a step is waited for stops it, and so does letting go of this. As a context manager it stops however it is
+    left, also where Ctrl-C comes between two steps:
+
+        with skinfit.fit_steps([scene]) as steps:
+            for step in steps:
+                print(step.loss)
+        found = steps.result()
     """
 
-    def __init__(self, native: _native.Fitting, run: Path, scenes: Sequence[Scene], scratch: Any) -> None:
-        self._native = native
+    def __init__(self, running: Running, run: Path, scenes: Sequence[Scene], scratch: Any) -> None:
+        self._running = running
+        self._native = running.native
         self._run = run
         self._scenes = scenes
         self._scratch = scratch
@@ -263,33 +263,62 @@ class FitSteps(Iterator[Step]):
         """The last step; `None` while the scenes are still read, baked and sampled."""
 
     def __next__(self) -> Step:
-        told = self._native.next()
-        if told is None:
-            raise StopIteration
-        iteration, evaluations, loss, seconds, constants = told
-        scenes = [{name: _value(rgb) for name, rgb in scene.items()} for scene in constants]
-        self.last = Step(iteration, evaluations, loss, seconds, scenes[0], scenes)
-        return self.last
+        """The next step. Raises what `result` raises where the fit was refused or failed."""
+        with self._interrupted():
+            self._running.taken()
+            told = self._native.next()
+            if told is None:
+                raise StopIteration
+            iteration, evaluations, loss, seconds, constants = told
+            scenes = [{name: _value(rgb) for name, rgb in scene.items()} for scene in constants]
+            step = self.last = Step(iteration, evaluations, loss, seconds, scenes[0], scenes)
+        return step
+
+    def __enter__(self) -> FitSteps:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
     def __del__(self) -> None:
         """Left without a result: it ends, and its folder stays until it has."""
         if not self._native.is_over:
-            self._native.stop()
+            self.stop()
             with contextlib.suppress(RuntimeError):
                 threading.Thread(target=_see_off, args=(self._native, self._scratch), daemon=True).start()
 
     def stop(self) -> None:
         """Have the fit end after the iteration that it is at, with what it has found and a state to be resumed. Before the first
         step nothing is found: `result` raises `FitError`."""
-        self._native.stop()
+        self._running.stop()
+
+    def close(self) -> None:
+        """Stop, and wait until its folder holds what there is, unless nothing is there yet: then what was begun ends by itself.
+        Once it is over this does nothing."""
+        self.stop()
+        if self.last is not None:
+            # `result` raises it.
+            with contextlib.suppress(Error):
+                self._native.finish()
 
     def result(self) -> Fit:
-        """Wait for its end: what it has found. Raises `FitError` where it was refused or failed."""
-        said, told = self._native.finish()
+        """Wait for its end: what it has found. Raises `FitError` where it was refused or failed, `ViewError` where `hold_out`
+        names no view. Ctrl-C stops it; asked for again, this is what there is."""
+        with self._interrupted():
+            said, told = self._native.finish()
         _warn(told)
         if self._scratch is None:
             stays(self._run)
         return Fit(self._run, self._scenes, "\n".join(said), self._scratch)
+
+    @contextlib.contextmanager
+    def _interrupted(self) -> Iterator[None]:
+        """Stop where Ctrl-C is heard."""
+        try:
+            yield
+        except KeyboardInterrupt:
+            self.stop()
+            raise
 
 
 def _see_off(native: _native.Fitting, scratch: Any) -> None:
@@ -314,23 +343,34 @@ def fit_steps(
             if step.loss < 1e-4:
                 steps.stop()
         found = steps.result()
+
+    A fit into the same folder that was stopped, or that this thread has left between two steps, is waited for.
     """
-    unknown = set(options) - set(FitOptions.__annotations__)
-    if unknown:
-        raise TypeError(f"a fit has no option {', '.join(sorted(unknown))}; it has {', '.join(FitOptions.__annotations__)}.")
-    if resume and run is None:
+    given, held, words = _scenes(scenes), names_of(hold_out), words_of(options)
+    if run is None and resume:
         raise FitError("a fit goes on in the folder that it was stopped in. Name it: run=...")
+    if run is not None and not os.fspath(run):
+        raise FitError("run = '' names no folder. Name one, or leave it out.")
     scratch = tempfile.TemporaryDirectory(prefix="skinfit-", ignore_cleanup_errors=True) if run is None else None
     place = Path(scratch.name) / "fit" if scratch is not None else Path(str(run))
-    words = [f"--hold-out={name}" for name in hold_out]
-    for name, value in options.items():
-        option = "--" + name.replace("_", "-")
-        if value is True:
-            words.append(option)
-        elif value is not False and value is not None:
-            words.append(f"{option}={value}")
-    native = _native.Fitting([scene._native for scene in scenes], place, words, resume)
-    return FitSteps(native, place, scenes, scratch)
+    make_way(place)
+    native = _native.Fitting([scene._native for scene in given], place, words, held, resume)
+    return FitSteps(Running(native, place), place, given, scratch)
+
+
+def _scenes(scenes: Sequence[Scene]) -> list[Scene]:
+    """What is to be fitted: scenes, and at least one."""
+    from .scene import Scene
+
+    if isinstance(scenes, Scene) or not isinstance(scenes, Iterable):
+        raise FitError(f"{scenes!r} is no list of scenes. Give one, as [skinfit.load_file(path)].")
+    given = list(scenes)
+    if not given:
+        raise FitError("no scene is given. Give at least one, as [skinfit.load_file(path)].")
+    for scene in given:
+        if not isinstance(scene, Scene):
+            raise FitError(f"{scene!r} is no scene. Give scenes, as skinfit.load_file(path).")
+    return given
 
 
 def fit(
@@ -355,8 +395,9 @@ def fit(
 
     Ctrl-C stops the search after its iteration and keeps what there is: the `Fit` then is `interrupted`. Before the search,
     while scenes are read and baked, nothing is there to keep, and `KeyboardInterrupt` is raised, as it is by Ctrl-C a second
-    time. Python's lock is free meanwhile. Raises `FitError` and `SkinError` with the command line's paragraph. A fit that did
-    not converge is no error: a `SkinfitWarning` says what to do.
+    time; what was begun then ends by itself, and a fit into the same folder waits for that. Python's lock is free meanwhile.
+    Raises `FitError` and `SkinError` with the command line's paragraph, and `ViewError` where `hold_out` names no view. A fit
+    that did not converge is no error: a `SkinfitWarning` says what to do.
 
     >>> import skinfit
     >>> found = skinfit.fit([skinfit.demo()], engine="cpu")
@@ -368,9 +409,10 @@ def fit(
     steps = fit_steps(scenes, run=run, resume=resume, hold_out=hold_out, **options)
     shown = Progress(progress)
     try:
+        shown.begin()
         for step in steps:
             shown.step(step)
-            if callback is not None and callback(step) is False:
+            if callback is not None and _is_false(callback(step)):
                 steps.stop()
                 break
     except KeyboardInterrupt:
@@ -414,6 +456,17 @@ def _value(number: float | Sequence[float]) -> Value:
         return float(number)
     red, green, blue = map(float, number)
     return red if red == green == blue else (red, green, blue)
+
+
+def _gain(view: str, found: Mapping[str, float]) -> Value:
+    """A view's gain, which is one unknown, or one a channel."""
+    whole = found.get(f"gain.{view}", 1.0)
+    return _value([found.get(f"gain.{view}.{channel}", whole) for channel in "rgb"])
+
+
+def _is_false(answer: object) -> bool:
+    """Whether a callback says so; `None` does not."""
+    return isinstance(answer, (bool, np.bool_)) and not answer
 
 
 def _warn(told: Sequence[str]) -> None:

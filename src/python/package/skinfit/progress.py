@@ -18,9 +18,15 @@ class Progress:
         self._terminal = not self._notebook and (sys.stderr.isatty() if shown is None else shown)
         self._length = 0
 
+    def begin(self) -> None:
+        """Show that there is no step yet."""
+        self._show("fit: scenes are read, baked and sampled")
+
     def step(self, step: Step) -> None:
         """Show a step."""
-        line = f"fit: {step.iteration} iterations, {step.evaluations} passes, loss {step.loss:.6e}"
+        self._show(f"fit: {step.iteration} iterations, {step.evaluations} passes, loss {step.loss:.6e}")
+
+    def _show(self, line: str) -> None:
         if self._notebook:
             self._display(line)
         elif self._terminal:
@@ -56,5 +62,5 @@ def _in_notebook() -> bool:
     shell = sys.modules.get("IPython")
     if shell is None:
         return False
-    running = shell.get_ipython()
-    return running is not None and type(running).__name__ == "ZMQInteractiveShell"
+    # Jupyter's, or one that is made of it, as Colab's.
+    return any(kind.__name__ == "ZMQInteractiveShell" for kind in type(shell.get_ipython()).__mro__)
