@@ -23,7 +23,7 @@ from .study import Study
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-    from .fit import FitOptions
+    from .options import FitOptions
     from .study import AblateOptions, StabilityOptions, TradeoffOptions
 
 Cache = Union[FilePath, bool]
