@@ -18,7 +18,7 @@ use crate::asked::Asked;
 use crate::errors::Refused;
 use crate::fault::provoked;
 use crate::scene::Scene;
-use crate::waiting::{SLICE, begin, guarded, locked, not_forked};
+use crate::waiting::{SLICE, begin, guarded, here, locked, not_forked};
 
 /// An iteration, and where it has led in each scene.
 struct Step {
@@ -77,7 +77,7 @@ impl Fitting {
         resume: bool,
     ) -> PyResult<Self> {
         let reads = scenes.iter().map(|scene| Arc::clone(&scene.0)).collect();
-        fitting(Asked::new(reads, run, words, hold_out, resume)?)
+        fitting(here(|| Asked::new(reads, run, words, hold_out, resume))?)
     }
 
     /// Whether it ended.

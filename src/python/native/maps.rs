@@ -8,7 +8,8 @@ use numpy::{
     PyUntypedArrayMethods as _,
 };
 use pyo3::types::{PyAnyMethods as _, PyDict, PyDictMethods as _};
-use pyo3::{Bound, Py, PyClassInitializer, PyResult, Python, pyclass, pymethods};
+use pyo3::{Bound, Py, PyClassInitializer, PyErr, PyResult, Python, pyclass, pymethods};
+use skinfit_core::engine::Point;
 use skinfit_core::prepare::Observed;
 use skinfit_core::scene::{MapKind, suggestion};
 
@@ -17,7 +18,7 @@ use crate::errors::Refused;
 use crate::free::{Constants, Free, observe};
 use crate::scene::Read;
 use crate::tensors::Function;
-use crate::waiting::wait;
+use crate::waiting::{here, wait};
 
 /// A map: its name, the shape of its array, and the least and greatest value that a fit allows.
 pub(crate) struct Map {
@@ -61,6 +62,11 @@ impl MapObjective {
         let function = Function::new(py, &free, views, kinds, adapter)?;
         let constants = PyClassInitializer::from(Constants(Arc::clone(&free)));
         Py::new(py, constants.add_subclass(Self { free, function }))
+    }
+
+    /// The point of a vector and the maps of a dictionary.
+    fn asked(&self, x: &PyReadonlyArray1<'_, f64>, maps: &Bound<'_, PyDict>) -> PyResult<(Point, GivenMaps)> {
+        here(|| Ok::<_, PyErr>((self.free.at(&numbers(x))?, self.given(maps)?)))
     }
 
     /// The maps of a dictionary.
@@ -131,7 +137,8 @@ impl MapObjective {
 
     /// The loss.
     fn loss(&self, py: Python<'_>, x: PyReadonlyArray1<'_, f64>, maps: &Bound<'_, PyDict>) -> PyResult<f64> {
-        self.function.loss(py, self.free.at(&numbers(&x))?, self.given(maps)?)
+        let (point, maps) = self.asked(&x, maps)?;
+        self.function.loss(py, point, maps)
     }
 
     /// The loss, and its gradients by constants and maps.
@@ -142,7 +149,7 @@ impl MapObjective {
         x: PyReadonlyArray1<'_, f64>,
         maps: &Bound<'_, PyDict>,
     ) -> PyResult<(f64, Bound<'py, PyArray1<f64>>, Bound<'py, PyDict>)> {
-        let (point, maps) = (self.free.at(&numbers(&x))?, self.given(maps)?);
+        let (point, maps) = self.asked(&x, maps)?;
         let (loss, (constants, maps)) = self.function.loss_and_gradient(py, point, maps)?;
         Ok((loss, PyArray1::from_vec(py, constants), self.arrays(py, maps)?))
     }
@@ -156,9 +163,9 @@ impl MapObjective {
         maps: &Bound<'_, PyDict>,
         view: Option<&str>,
     ) -> PyResult<Bound<'py, PyArray3<f32>>> {
-        let (view, point) = (self.free.view(view)?, self.free.at(&numbers(&x))?);
+        let (view, (point, maps)) = (self.free.view(view)?, self.asked(&x, maps)?);
         let [height, width] = self.free.size(view);
-        let image = self.function.image(py, view, point, self.given(maps)?)?;
+        let image = self.function.image(py, view, point, maps)?;
         PyArray1::from_vec(py, image).reshape([height, width, 3])
     }
 
@@ -173,7 +180,7 @@ impl MapObjective {
         view: Option<&str>,
     ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyDict>)> {
         let view = self.free.view_of_image(view, image.shape())?;
-        let (point, maps) = (self.free.at(&numbers(&x))?, self.given(maps)?);
+        let (point, maps) = self.asked(&x, maps)?;
         let (constants, maps) = self.function.vjp(py, view, point, maps, numbers(&image))?;
         Ok((PyArray1::from_vec(py, constants), self.arrays(py, maps)?))
     }

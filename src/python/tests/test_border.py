@@ -144,6 +144,13 @@ def test_what_the_command_line_refuses_is_told_in_pythons_words(small: skinfit.S
     assert "--" not in str(refused.value)
 
 
+def test_what_a_study_refuses_is_told_in_pythons_words(small: skinfit.Scene) -> None:
+    when: Any = "often"
+    with pytest.raises(skinfit.StudyError, match="^invalid value 'often' for 'gpu'") as refused:
+        small.ablate(gpu=when)
+    assert "--" not in str(refused.value)
+
+
 def test_names_that_are_held_out_are_names_of_views(small: skinfit.Scene) -> None:
     with pytest.raises(skinfit.ViewError, match=r"\['side'\]"):
         small.fit(hold_out="side")
