@@ -34,7 +34,8 @@ from .errors import (  # noqa: E402
     StudyError,
     ViewError,
 )
-from .fit import Fit, FitSteps, Iteration, Scores, Step, fit, fit_steps, load_run  # noqa: E402
+from .fit import FitSteps, Step, fit, fit_steps  # noqa: E402
+from .found import Fit, Iteration, Scores, load_run  # noqa: E402
 from .loading import demo, load_dict  # noqa: E402
 from .maps import MapGradients, MapObjective  # noqa: E402
 from .objective import NormalEquations, Objective  # noqa: E402

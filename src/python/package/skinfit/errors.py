@@ -4,6 +4,12 @@ A paragraph says file, place, what is wrong and what to do. All are `Error`; tho
 `ValueError` too, those about a name `LookupError`.
 """
 
+from __future__ import annotations
+
+import sys
+import warnings
+from collections.abc import Iterable
+
 
 class Error(Exception):
     """Whatever skinfit raises."""
@@ -59,3 +65,12 @@ class Fault(Error, RuntimeError):
 
 class SkinfitWarning(UserWarning):
     """What the command line would print as a warning: something was mended, or left out."""
+
+
+def warn(told: Iterable[str]) -> None:
+    """Warn of what the library has told, where the package was called from."""
+    level, frame = 2, sys._getframe(1)
+    while frame.f_back is not None and frame.f_globals.get("__package__") == __package__:
+        level, frame = level + 1, frame.f_back
+    for words in told:
+        warnings.warn(words.removeprefix("warning: "), SkinfitWarning, stacklevel=level)

@@ -8,7 +8,7 @@ from typing import Any, Literal, TypedDict, get_args, get_type_hints
 
 import numpy as np
 
-from .errors import FitError, ViewError
+from .errors import FitError
 
 
 class FitOptions(TypedDict, total=False):
@@ -49,17 +49,6 @@ def words_of(options: Mapping[str, Any]) -> list[str]:
         raise TypeError(f"a fit has no option {', '.join(unknown)}; it has {', '.join(kinds)}.")
     given = {name: value for name, value in options.items() if value is not None}
     return [word for name, value in given.items() for word in _words(name, value, kinds[name])]
-
-
-def names_of(hold_out: Sequence[str]) -> list[str]:
-    """The names of what is held out."""
-    if isinstance(hold_out, str):
-        raise ViewError(f"hold_out = {hold_out!r} is one name. Give a list of names: [{hold_out!r}].")
-    names = list(hold_out)
-    for name in names:
-        if not isinstance(name, str):
-            raise ViewError(f"hold_out has {name!r}, which is no name. Give names of views.")
-    return names
 
 
 def _words(name: str, value: Any, kind: Any) -> list[str]:

@@ -7,13 +7,12 @@ It is written into the player, the page without a scene, which `src/page/build` 
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from urllib.parse import quote
 
 from .command import PLAYER, run
-from .errors import FileError, SkinfitWarning
+from .errors import FileError, warn
 from .given import FilePath
 from .html import framed
 
@@ -42,8 +41,7 @@ class Page:
 def write(of: Sequence[str], file: Path, player: FilePath | None, kept: object = None) -> Page:
     """Write the page of a run folder or of scene files, with further words of the command line."""
     run_words = ["page", *of, "-o", str(file), "--player", str(_player(player))]
-    for words in run(run_words, FileError).told:
-        warnings.warn(words.removeprefix("warning: "), SkinfitWarning, stacklevel=3)
+    warn(run(run_words, FileError).told)
     return Page(file, kept)
 
 

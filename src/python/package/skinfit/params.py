@@ -205,7 +205,7 @@ class Params(MutableMapping[str, Value]):
             if was["free"] != now["free"]:
                 self._scene.set_freedom(name, was["free"])
             if was["value"] != self._scene.row(name)["value"]:
-                value = _value(was["value"])
+                value = value_of(was["value"])
                 self._scene.set(name, list(value) if isinstance(value, tuple) else [value])
 
     def __repr__(self) -> str:
@@ -257,8 +257,11 @@ def _called(file: Path) -> set[str]:
     return {folder if of_folder else own, f"{folder}.{own}", own}
 
 
-def _value(rgb: Sequence[float]) -> Value:
-    red, green, blue = map(float, rgb)
+def value_of(given: float | Sequence[float]) -> Value:
+    """One number, or three where channels differ."""
+    if isinstance(given, (int, float)):
+        return float(given)
+    red, green, blue = map(float, given)
     return red if red == green == blue else (red, green, blue)
 
 
@@ -267,8 +270,8 @@ def _info(row: _native._Row) -> ParamInfo:
     least, greatest = row["limits"]
     return ParamInfo(
         name=row["name"],
-        value=_value(row["value"]),
-        default=_value(row["default"]),
+        value=value_of(row["value"]),
+        default=value_of(row["default"]),
         bounds=(lower, upper),
         limits=(least, greatest),
         unit=row["unit"],

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import tempfile
-import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, Union
 
 from . import _native, page, study
-from .errors import ArrayError, FileError, SceneError, SkinfitWarning, ViewError
-from .fit import Fit, FitSteps, Step, fit, fit_steps
+from .errors import ArrayError, Error, FileError, SceneError, ViewError, warn
+from .fit import FitSteps, Step, fit, fit_steps
+from .found import Fit
 from .given import FilePath, Names, names
 from .maps import MapObjective
 from .objective import Objective, view_name
@@ -216,10 +216,9 @@ class Scene:
 
     def _warn_once(self, words: Sequence[str]) -> None:
         """Warn of what was not told yet."""
-        for paragraph in words:
-            if paragraph not in self._told:
-                self._told.add(paragraph)
-                warnings.warn(paragraph, SkinfitWarning, stacklevel=3)
+        new = [paragraph for paragraph in words if paragraph not in self._told]
+        self._told.update(new)
+        warn(new)
 
     def _file(self, folder: Path) -> Path:
         """A file of the scene as it stands: its own, or where values were changed one in `folder` that is called the same."""
@@ -266,3 +265,16 @@ def cache_folder(cache: Cache) -> FilePath | None:
     if cache is True:
         return Path(_native.default_cache())
     return None if cache is False else cache
+
+
+def scenes_of(given: object, refused: type[Error]) -> list[Scene]:
+    """The scenes of a list, of which there has to be one. Raises `refused` for anything else."""
+    if isinstance(given, Scene) or not isinstance(given, Iterable):
+        raise refused(f"{given!r} is no list of scenes. Give one, as [skinfit.load_file(path)].")
+    scenes = list(given)
+    if not scenes:
+        raise refused("no scene is given. Give at least one, as [skinfit.load_file(path)].")
+    for scene in scenes:
+        if not isinstance(scene, Scene):
+            raise refused(f"{scene!r} is no scene. Give scenes, as skinfit.load_file(path).")
+    return scenes

@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import json
 import tempfile
-import warnings
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypedDict
 
 from .command import run as run_command
-from .errors import FileError, SkinfitWarning, StudyError
+from .errors import FileError, StudyError, warn
 from .given import FilePath, Names, names
 from .html import framed
 from .scratch import Scratch, copy_run, stays
@@ -177,7 +176,9 @@ def copy(folder: Path, to: Path) -> Path:
 
 
 def _study(command: str, given: Iterable[Scene], run: FilePath | None, words: Sequence[str]) -> Study:
-    scenes = _scenes(command, given)
+    from .scene import scenes_of
+
+    scenes = scenes_of(given, StudyError)
     scratch = Scratch() if run is None else None
     place = Path(scratch.name) / command if scratch is not None else Path(str(run))
     with tempfile.TemporaryDirectory(prefix="skinfit-") as changed:
@@ -187,24 +188,8 @@ def _study(command: str, given: Iterable[Scene], run: FilePath | None, words: Se
         raise StudyError("\n".join(said.told))
     if scratch is None:
         stays(place)
-    for words_told in said.told:
-        warnings.warn(words_told.removeprefix("warning: "), SkinfitWarning, stacklevel=3)
+    warn(said.told)
     return Study(place, said.out, said.failed, scratch)
-
-
-def _scenes(command: str, given: Iterable[Scene]) -> list[Scene]:
-    """The scenes, of which there has to be one."""
-    from .scene import Scene
-
-    if not isinstance(given, Iterable):
-        raise StudyError(f"{command}: {given!r} is no list of scenes, or no scene. Give a list, as [scene].")
-    scenes = list(given)
-    for scene in scenes:
-        if not isinstance(scene, Scene):
-            raise StudyError(f"{command}: {scene!r} is no scene. Give a list of what load_file or load_dict returns.")
-    if not scenes:
-        raise StudyError(f"{command}: no scene is given. Give a list with one or more.")
-    return scenes
 
 
 def _stability_rows(report: dict[str, Any]) -> list[Row]:
