@@ -72,7 +72,8 @@ class Watched:
 
 
 def test_what_is_computed_becomes_a_tensor_without_a_copy(objective: skinfit.Objective) -> None:
-    watched, x = Watched(objective), inside(objective).detach()
+    watched: Any = Watched(objective)
+    x = inside(objective).detach()
     picture = skinfit.torch.image(watched, x, "front")
     address, _ = watched.drawn.__array_interface__["data"]
     assert picture.data_ptr() == address and picture.dtype == torch.float64

@@ -70,7 +70,8 @@ def test_it_says_what_maturin_writes(packed: zipfile.ZipFile, tmp_path: Path, no
         not_checked("there is no maturin or no cargo, so the packed METADATA was not compared with maturin's")
         pytest.skip("NOT CHECKED: no maturin or no cargo")
     # It reads manifests, and compiles nothing.
-    words = [maturin, "pep517", "write-dist-info", "--metadata-directory", tmp_path, "--interpreter", sys.executable]
+    words = [str(maturin), "pep517", "write-dist-info", "--metadata-directory", str(tmp_path)]
+    words += ["--interpreter", sys.executable]
     subprocess.run(words, cwd=HERE, check=True, capture_output=True)
     (written,) = tmp_path.glob("*.dist-info")
 
