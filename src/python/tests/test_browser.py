@@ -1,4 +1,4 @@
-"""A fit's page in headless Chromium, from the disk and within the frame that a notebook has of it. What one does with it there is
+"""A fit's page in headless Chromium, from the disk and within the frames that a notebook has of it. What one does with it there is
 tested by the program's own tests."""
 
 import json
@@ -83,9 +83,14 @@ def opened(browser: str, file: Path, sent: "queue.Queue[Any]") -> Any:
                 running.terminate()
 
 
-@pytest.mark.parametrize("framed", [False, True])
+@pytest.mark.parametrize("frame", ["", "srcdoc", "src"])
 def test_a_fit_is_drawn_in_a_browser(
-    framed: bool, browser: str, answers: "tuple[str, queue.Queue[Any]]", small: skinfit.Scene, tmp_path: Path
+    frame: str,
+    browser: str,
+    answers: "tuple[str, queue.Queue[Any]]",
+    small: skinfit.Scene,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     found = small.fit(engine="cpu")
     page = found.page(tmp_path / "skin.html", title="Mine & yours")
@@ -94,9 +99,13 @@ def test_a_fit_is_drawn_in_a_browser(
     assert text.count("</body>") == 1
     page.file.write_text(text.replace("</body>", PROBE.replace("ADDRESS", address)), encoding="utf-8")
     file = page.file
-    if framed:
+    if frame:
+        # By its address where it lies below the working folder.
+        monkeypatch.chdir(tmp_path if frame == "src" else Path(__file__).parent)
         file = tmp_path / "notebook.html"
-        file.write_text(f"<!doctype html><title>A notebook</title>{page._repr_html_()}", encoding="utf-8")
+        html = page._repr_html_()
+        assert html.startswith(f"<iframe {frame}=")
+        file.write_text(f"<!doctype html><title>A notebook</title>{html}", encoding="utf-8")
     told = opened(browser, file, sent)
     assert told["title"].startswith("Mine & yours") and (told["width"], told["height"]) == (48, 40)
     # It stands where the fit has ended: the targets are the model's own.
