@@ -3,7 +3,8 @@
 else there is made of: `pack.py LIBRARY FOLDER [PLAYER]` prints the wheel's path. With the page without a scene that
 `src/page/build` has made, `PLAYER`, the wheel can write pages by itself.
 
-`pip install ./src/python` compiles by itself; the two wheels hold the same files.
+`pip install ./src/python` compiles by itself; the two wheels hold the same files, and say the same of themselves.
+It takes Python 3.11; the wheel serves older ones.
 """
 
 import base64
@@ -14,7 +15,13 @@ import re
 import sys
 import sysconfig
 import zipfile
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
+
+if sys.version_info < (3, 11):
+    raise SystemExit("pack.py: it reads TOML by Python's own module, which Python has from 3.11 on")
+import tomllib
 
 HERE = Path(__file__).resolve().parent
 PACKAGE = HERE / "package"
@@ -24,27 +31,47 @@ ABI = "cp310-abi3"
 
 def version() -> str:
     """The workspace's version."""
-    manifest = (HERE / "../../Cargo.toml").read_text(encoding="utf-8")
-    found = re.search(r'^\[workspace\.package\]\nversion = "(.+)"$', manifest, re.MULTILINE)
-    if found is None:
-        raise SystemExit("pack.py: Cargo.toml has no [workspace.package] version")
-    return found[1]
+    workspace: str = read("../../Cargo.toml")["workspace"]["package"]["version"]
+    return workspace
+
+
+def read(manifest: str) -> dict[str, Any]:
+    """A manifest beside this file."""
+    return tomllib.loads((HERE / manifest).read_text(encoding="utf-8"))
 
 
 def metadata() -> dict[str, str]:
-    """The files of the wheel's .dist-info, but for RECORD; requirements as pyproject.toml has them."""
-    project = (HERE / "pyproject.toml").read_text(encoding="utf-8")
-    requires = re.search(r'^dependencies = \["(.+)"\]$', project, re.MULTILINE)
-    python = re.search(r'^requires-python = "(.+)"$', project, re.MULTILINE)
-    script = re.search(r'^\[project\.scripts\]\n(.+) = "(.+)"$', project, re.MULTILINE)
-    if requires is None or python is None or script is None:
-        raise SystemExit("pack.py: pyproject.toml lacks dependencies, requires-python or a script")
+    """The files of the wheel's .dist-info, but for RECORD: what maturin writes of pyproject.toml."""
+    project = read("pyproject.toml")["project"]
+    scripts = "".join(f"{name} = {function}\n" for name, function in project["scripts"].items())
     return {
-        "METADATA": f"Metadata-Version: 2.1\nName: skinfit\nVersion: {version()}\n"
-        f"Requires-Python: {python[1]}\nRequires-Dist: {requires[1]}\n",
+        "METADATA": "".join(f"{name}: {value}\n" for name, value in described(project)),
         "WHEEL": f"Wheel-Version: 1.0\nGenerator: skinfit\nRoot-Is-Purelib: false\nTag: {tag()}\n",
-        "entry_points.txt": f"[console_scripts]\n{script[1]} = {script[2]}\n",
+        "entry_points.txt": f"[console_scripts]\n{scripts}",
     }
+
+
+def described(project: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """METADATA, line by line. Raises for what is in pyproject.toml and has no line here."""
+    known = {
+        "name", "description", "requires-python", "license", "dependencies", "dynamic", "keywords", "optional-dependencies",
+        "scripts",
+    }
+    if project.keys() - known or project["dynamic"] != ["version"]:
+        raise SystemExit(f"pack.py: it does not know what to do with {project.keys() - known or project['dynamic']}")
+    yield "Metadata-Version", "2.4"
+    yield "Name", project["name"]
+    yield "Version", version()
+    for requirement in project["dependencies"]:
+        yield "Requires-Dist", requirement
+    for extra, requirements in sorted(project["optional-dependencies"].items()):
+        for requirement in requirements:
+            yield "Requires-Dist", f"{requirement} ; extra == '{extra}'"
+        yield "Provides-Extra", extra
+    yield "Summary", project["description"]
+    yield "Keywords", ",".join(project["keywords"])
+    yield "License-Expression", project["license"]
+    yield "Requires-Python", project["requires-python"]
 
 
 def tag() -> str:

@@ -9,6 +9,14 @@
     scene.params.set_all(found.params)
     image = scene.render("front").image        # (height, width, 3) float32, linear Rec.709
 
+The built-in scene needs no file:
+
+    >>> import skinfit
+    >>> scene = skinfit.demo()
+    >>> scene.params["rim_exponent"] = 3.0
+    >>> scene.render("front").image.shape
+    (320, 320, 3)
+
 Images are linear Rec.709 radiance, premultiplied by coverage, row by row from the top; angles are degrees, lengths the
 scene's own. What is refused raises an `Error` of a class a kind, with a paragraph on what to do; Ctrl-C ends what is under
 way; other threads go on meanwhile. `skinfit.torch` and `skinfit.jax` have the same as functions of PyTorch's and JAX's.

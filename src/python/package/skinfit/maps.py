@@ -1,4 +1,11 @@
-"""A scene's fit as a function of what is free and of whole maps, on a graphics adapter."""
+"""A scene's fit as a function of what is free and of whole maps, on a graphics adapter.
+
+    >>> import skinfit
+    >>> f = skinfit.demo().map_objective("color")
+    >>> loss, gradients = f.loss_and_gradient(maps={"color": 0.9 * f.maps["color"]})
+    >>> gradients.maps["color"].shape == f.maps["color"].shape, gradients.constants.shape == f.start.shape
+    (True, True)
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,12 @@
 
 It is written into the player, the page without a scene, which `src/page/build` makes: the argument `player`, else what
 `SKINFIT_PLAYER` names, else the package's own `player.html`, where the wheel was packed with one.
+
+    >>> import skinfit
+    >>> skinfit.demo().page(player="nowhere.html")
+    Traceback (most recent call last):
+        ...
+    skinfit.errors.FileError: nowhere.html: ...
 """
 
 from __future__ import annotations

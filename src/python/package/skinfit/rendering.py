@@ -1,4 +1,10 @@
-"""An image that was drawn, with what it is made of."""
+"""An image that was drawn, with what it is made of.
+
+    >>> import numpy as np, skinfit
+    >>> grey = skinfit.Rendering(image=np.full((2, 3, 3), 0.25, np.float32), alpha=np.ones((2, 3), np.float32))
+    >>> grey.srgb(exposure=1.0)[0, 0].tolist()
+    [188, 188, 188]
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,11 @@
 """Studies of the command line: what each part is worth, what accuracy costs, and whether every evaluator is stable.
 
 Each runs in a process of its own and leaves a folder, which `Study` is a view of.
+
+    >>> import skinfit
+    >>> study = skinfit.demo().tradeoff(axes=["filter"])
+    >>> list(study.plots), {row["axis"] for row in study.rows()}
+    (['filter'], {'filter'})
 """
 
 from __future__ import annotations

@@ -1,21 +1,25 @@
 """A scene's loss and images as functions of PyTorch's, differentiable with respect to the free constants and to maps.
 
-    import torch, skinfit, skinfit.torch
-
-    f = skinfit.demo().objective()
-    x = torch.tensor(f.start, requires_grad=True)
-    skinfit.torch.loss(f, x).backward()        # x.grad is the loss' gradient
-    image = skinfit.torch.image(f, x, "front") # (height, width, 3), differentiable
+    >>> import torch, skinfit, skinfit.torch
+    >>> f = skinfit.demo().objective()
+    >>> x = torch.tensor(f.start, requires_grad=True)
+    >>> skinfit.torch.loss(f, x).backward()
+    >>> x.grad.shape == x.shape
+    True
+    >>> skinfit.torch.image(f, x, "front").shape
+    torch.Size([320, 320, 3])
 
 Of `Scene.map_objective` they take maps as well, by name:
 
-    f = skinfit.demo().map_objective("color")
-    color = torch.from_dlpack(f.maps["color"]).requires_grad_()
-    skinfit.torch.loss(f, maps={"color": color}).backward()
+    >>> f = skinfit.demo().map_objective("color")
+    >>> color = torch.from_dlpack(f.maps["color"]).requires_grad_()
+    >>> skinfit.torch.loss(f, maps={"color": color}).backward()
+    >>> color.grad.shape == color.shape
+    True
 
-Constants alone are computed on the processor, in float64; maps on a graphics adapter, in float32. What is computed shares its
-memory with the tensor that is made of it (DLPack), and so does a tensor with the array that is computed of; another
-device, or another kind of number, takes a copy. First derivatives alone.
+Constants alone are computed on the processor, in float64; maps on a graphics adapter, in float32. What is computed becomes a
+tensor in the memory that it was computed into (DLPack), unless that is to be on another device or of another kind of number.
+Tensors that are given are copied at each call. First derivatives alone.
 """
 
 from __future__ import annotations
@@ -103,7 +107,7 @@ def _given(objective: AnyObjective, x: torch.Tensor | None, maps: Maps) -> tuple
 
 
 def _arguments(objective: AnyObjective, names: list[str], point: Point) -> Any:
-    """What the methods of the objective take first, of tensors on the processor without a copy."""
+    """What the methods of the objective take first."""
     x, *maps = point
     constants = objective.start if x is None else _array(x, torch.float64)
     if isinstance(objective, MapObjective):
