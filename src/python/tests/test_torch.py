@@ -13,8 +13,8 @@ from test_docs import run_blocks, run_docstrings
 
 
 @pytest.fixture(scope="module")
-def objective(demo_file: Path, cache: Path) -> skinfit.Objective:
-    return skinfit.load_file(demo_file, cache=cache).objective()
+def objective(small_file: Path, cache: Path) -> skinfit.Objective:
+    return skinfit.load_file(small_file, cache=cache).objective()
 
 
 @pytest.fixture(scope="module")
@@ -40,9 +40,8 @@ def test_the_loss_has_its_gradient(objective: skinfit.Objective) -> None:
 def test_torch_checks_the_gradient_of_the_loss(objective: skinfit.Objective) -> None:
     at = inside(objective)
     most = np.abs(objective.gradient(at.detach().numpy())).max()
-    # Sums of 32 bits leave some 1e-7 of the loss, 4e-9 here: a step that is not too small. What cubes and bumps bend is below
-    # a hundredth of the largest slope.
-    assert torch.autograd.gradcheck(lambda x: skinfit.torch.loss(objective, x), at, eps=1e-3, atol=1e-2 * most, rtol=0.0)
+    # Sums of 32 bits leave some 1e-7 of the loss: a step that is not too small. What it bends goes by the step's square.
+    assert torch.autograd.gradcheck(lambda x: skinfit.torch.loss(objective, x), at, eps=1e-3, atol=1e-3 * most, rtol=0.0)
 
 
 def test_the_image_has_its_jacobian(objective: skinfit.Objective) -> None:
