@@ -86,6 +86,11 @@ pub(crate) fn set_bounds(values: &mut Values, name: &str, bounds: Option<[f64; 2
     Ok(())
 }
 
+/// Whether the model has a parameter of that name, and the scene no row.
+pub(crate) fn is_idle(values: &Values, name: &str) -> bool {
+    Param::from_name(name).is_some_and(|param| !values.rows().contains(&param))
+}
+
 /// The parameter of that name among the scene's rows.
 fn known(values: &Values, name: &str) -> Result<Param, Refused> {
     let rows = values.rows();

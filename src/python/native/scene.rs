@@ -146,6 +146,11 @@ impl Scene {
         here(|| params::set_freedom(&mut locked(&self.0.values), name, freedom))
     }
 
+    /// Whether the model has a parameter of that name that none of the scene's effects asks for.
+    fn is_idle(&self, name: &str) -> bool {
+        params::is_idle(&locked(&self.0.values), name)
+    }
+
     /// Have a fit move no parameter, those of effects that are off among them.
     fn fix_all(&self) {
         locked(&self.0.values).free.clear();

@@ -165,6 +165,7 @@ def test_a_scene_that_cannot_be_written_is_a_file_error(small: skinfit.Scene, tm
         small.save(tmp_path / "file" / "scene.toml")
 
 
+@pytest.mark.timed
 def test_an_image_takes_no_slopes(scene: skinfit.Scene) -> None:
     f = scene.objective()
 

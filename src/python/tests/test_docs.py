@@ -13,7 +13,7 @@ import skinfit
 DOCS = Path(__file__).resolve().parents[3] / "docs/python.md"
 MODULES = {module.name for module in pkgutil.iter_modules(skinfit.__path__) if not module.name.startswith("_")}
 # What the others are made of: nobody has to call these, so they need no example.
-INNER = {"command", "described", "errors", "html", "mesh", "progress"}
+INNER = {"command", "described", "errors", "exr", "given", "html", "mesh", "options", "progress", "running", "scratch"}
 
 
 @pytest.mark.parametrize("name", ["", *sorted(MODULES - {"torch", "maps"})])

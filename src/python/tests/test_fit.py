@@ -233,6 +233,7 @@ def test_several_scenes_are_fitted_as_one_skin(
         skinfit.fit([both[0], both[0]])
 
 
+@pytest.mark.timed
 def test_other_threads_go_on_while_a_fit_runs(scene: skinfit.Scene) -> None:
     count, over = 0, threading.Event()
 

@@ -1,4 +1,4 @@
-"""Pages of fits and scenes, and how a notebook frames them. That a page works in a browser is the program's own test."""
+"""Pages of fits and scenes, and how a notebook frames them. `test_browser.py` opens them."""
 
 import base64
 import html

@@ -197,17 +197,19 @@ def test_arrays_come_along_where_a_fit_is_kept(cache: Path, tmp_path: Path, unwa
     # Here it goes on as it began.
     found = scene.fit(engine="cpu", run=tmp_path / "named", resume=True, max_iterations=2)
     found.save(tmp_path / "saved")
+    with scene.fit_steps(engine="cpu", solver="nelder-mead", run=tmp_path / "left") as steps:
+        next(steps)
     with pytest.raises(skinfit.FileError, match="exists already"):
         found.save(tmp_path / "saved")
     folder = scene.path.parent
-    del scene, found
+    del scene, found, steps
     gc.collect()
     assert not folder.exists()
-    for run in ("named", "saved"):
+    for run in ("named", "saved", "left"):
         code = f"import skinfit; print(skinfit.load_run({str(tmp_path / run)!r}).resume(max_iterations=50).params)"
         done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
         assert done.returncode == 0 and "0.6" in done.stdout, done.stderr
-    assert sorted(file.name for file in tmp_path.iterdir()) == ["named", "saved"]
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["left", "named", "saved"]
 
 
 def test_a_copy_has_values_of_its_own(small: skinfit.Scene, unwarned: None) -> None:

@@ -14,7 +14,10 @@ import pytest
 
 from conftest import NotChecked
 
-tomllib = pytest.importorskip("tomllib", reason="Python has it from 3.11 on, and so does pack.py")
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 HERE = Path(__file__).resolve().parents[1]
 

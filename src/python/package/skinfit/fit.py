@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ from .options import FitOptions, words_of
 from .params import Value, value_of
 from .progress import Progress
 from .running import Running, make_way
-from .scratch import Scratch, stays
+from .scratch import Scratch, named_or_own, stays
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -58,7 +59,7 @@ class FitSteps(Iterator[Step]):
         found = steps.result()
     """
 
-    def __init__(self, running: Running, run: Path, scenes: Sequence[Scene], scratch: Any) -> None:
+    def __init__(self, running: Running, run: Path, scenes: Sequence[Scene], scratch: Scratch | None) -> None:
         self._running = running
         self._native = running.native
         self._run = run
@@ -87,10 +88,13 @@ class FitSteps(Iterator[Step]):
 
     def __del__(self) -> None:
         """Left without a result: it ends, and its folder stays until it has."""
-        if not self._native.is_over:
-            self.stop()
-            with contextlib.suppress(RuntimeError):
-                threading.Thread(target=_see_off, args=(self._native, self._scratch), daemon=True).start()
+        if self._native.is_over:
+            return
+        self.stop()
+        # At the end of the process no thread begins any more, and before it one is waited for that will end soon.
+        if not sys.is_finalizing():
+            left = (self._running, self._scratch)
+            threading.Thread(target=_see_off, args=left, daemon=self.last is None).start()
 
     def stop(self) -> None:
         """Have the fit end after the iteration that it is at, with what it has found and a state to be resumed. Before the first
@@ -112,8 +116,6 @@ class FitSteps(Iterator[Step]):
         with self._interrupted():
             said, told = self._native.finish()
         warn(told)
-        if self._scratch is None:
-            stays(self._run)
         return Fit(self._run, self._scenes, "\n".join(said), self._scratch)
 
     @contextlib.contextmanager
@@ -126,10 +128,10 @@ class FitSteps(Iterator[Step]):
             raise
 
 
-def _see_off(native: _native.Fitting, scratch: Any) -> None:
+def _see_off(running: Running, scratch: Scratch | None) -> None:
     """Wait for a fit that nobody waits for; then its folder goes."""
     with contextlib.suppress(Exception):
-        native.finish()
+        running.native.finish()
     del scratch
 
 
@@ -151,18 +153,31 @@ def fit_steps(
 
     A fit into the same folder that was stopped, or that this thread has left between two steps, is waited for.
     """
-    from .scene import scenes_of
-
-    given, held, words = scenes_of(scenes, FitError), names(hold_out, ViewError), words_of(options)
     if run is None and resume:
         raise FitError("a fit goes on in the folder that it was stopped in. Name it: run=...")
     if run is not None and not os.fspath(run):
         raise FitError("run = '' names no folder. Name one, or leave it out.")
-    scratch = Scratch() if run is None else None
-    place = Path(scratch.name) / "fit" if scratch is not None else Path(str(run))
-    make_way(place)
-    native = _native.Fitting([scene._native for scene in given], place, words, held, resume)
-    return FitSteps(Running(native, place), place, given, scratch)
+    place, scratch = named_or_own(run, "fit")
+    return begin(scenes, place, scratch, resume, hold_out, options)
+
+
+def begin(
+    scenes: Sequence[Scene],
+    run: Path,
+    scratch: Scratch | None,
+    resume: bool,
+    hold_out: Names,
+    options: FitOptions,
+) -> FitSteps:
+    """Begin a fit in `run`, which goes with `scratch`, if with any."""
+    from .scene import scenes_of
+
+    given, held, words = scenes_of(scenes, FitError), names(hold_out, ViewError), words_of(options)
+    make_way(run)
+    if scratch is None:
+        stays(run, [scene._folder for scene in given])
+    native = _native.Fitting([scene._native for scene in given], run, words, held, resume)
+    return FitSteps(Running(native, run), run, given, scratch)
 
 
 def fit(
@@ -198,7 +213,11 @@ def fit(
     >>> sorted(found.scores)
     ['front', 'profile', 'three_quarter']
     """
-    steps = fit_steps(scenes, run=run, resume=resume, hold_out=hold_out, **options)
+    return ended(fit_steps(scenes, run=run, resume=resume, hold_out=hold_out, **options), callback, progress)
+
+
+def ended(steps: FitSteps, callback: Callable[[Step], Any] | None, progress: bool | None) -> Fit:
+    """What a fit has found once it has ended, told of step by step."""
     shown = Progress(progress)
     try:
         shown.begin()

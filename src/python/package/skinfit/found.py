@@ -60,7 +60,13 @@ class Scores:
 
 
 class Fit:
-    """What a fit has found. `_repr_html_` is its report."""
+    """What a fit has found. `_repr_html_` is its report.
+
+    >>> import skinfit
+    >>> found = skinfit.demo().fit(engine="cpu")
+    >>> found.ending, len(found.history) > 3, found.gains["front"]
+    ('converged', True, 1.0)
+    """
 
     def __init__(
         self,
@@ -168,11 +174,10 @@ class Fit:
     def resume(self, callback: Callable[[Step], Any] | None = None, **options: Unpack[FitOptions]) -> Fit:
         """Go on from where it stopped, in the same folder, with its solver, starts and seed; `max_iterations` counts from
         the first start. Raises `FitError` where the scenes were changed since."""
-        from .fit import fit
+        from .fit import begin, ended
 
-        result = fit(self._scenes, callback, run=self.run, resume=True, hold_out=list(self.held_out), **options)
-        result._scratch = self._scratch
-        return result
+        steps = begin(self._scenes, self.run, self._scratch, True, list(self.held_out), options)
+        return ended(steps, callback, None)
 
     def export(
         self,

@@ -10,7 +10,7 @@ from . import _native
 from .described import describe
 from .given import FilePath, Names
 from .scene import Cache, Scene, cache_folder, read
-from .scratch import Scratch
+from .scratch import Scratch, named_or_own
 
 
 def load_dict(
@@ -57,8 +57,7 @@ def load_dict(
     >>> scene.render().image[3, 4].round(3).tolist()
     [0.5, 0.5, 0.5]
     """
-    scratch = Scratch() if folder is None else None
-    place = Path(scratch.name if scratch is not None else str(folder))
+    place, scratch = named_or_own(folder, "scene")
     new = describe(scene, place)
     try:
         return read(place / "scene.toml", cache_folder(cache), effects, scratch)
@@ -82,7 +81,7 @@ def demo(folder: FilePath | None = None, *, effects: Names | None = None, cache:
     scratch = None
     if folder is None and kept_bakes is None:
         scratch = Scratch()
-    place = folder or (scratch.name if scratch is not None else kept_bakes)
+    place = folder or (scratch.folder if scratch is not None else kept_bakes)
     assert place is not None
     file = _native.built_in_scene(place, kept_bakes)
     return read(file, kept_bakes, effects, scratch)

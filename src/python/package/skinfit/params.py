@@ -168,13 +168,10 @@ class Params(MutableMapping[str, Value]):
         self._set({**plain, **special})
 
     def _has(self, name: str) -> bool:
-        """Whether it is the scene's; not where none of the scene's effects asks for it."""
-        try:
-            self._scene.row(name)
-        except ParamError as error:
-            if str(error).startswith("no enabled effect"):
-                return False
-            raise
+        """Whether one of the scene's effects asks for it. Raises `ParamError` where the model has none that is called so."""
+        if self._scene.is_idle(name):
+            return False
+        self._scene.row(name)
         return True
 
     def _set(self, values: Mapping[str, float | Sequence[float]]) -> None:
@@ -198,8 +195,12 @@ class Params(MutableMapping[str, Value]):
 
     def _restore(self, rows: Sequence[_native._Row]) -> None:
         """Have rows as they were."""
-        for was, now in zip(rows, self._scene.rows()):
+        known = {row["name"]: row for row in self._scene.rows()}
+        for was in rows:
             name = was["name"]
+            # A file that was edited meanwhile may ask for others.
+            if (now := known.get(name)) is None:
+                continue
             if was["bounds"] != now["bounds"]:
                 self._scene.set_bounds(name, None if was["bounds"] == was["limits"] else was["bounds"])
             if was["free"] != now["free"]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import weakref
 from pathlib import Path
 
 from . import _native
@@ -19,13 +20,13 @@ class Running:
         self._folder = folder.resolve()
         self._stopped = False
         # The thread that has taken the last step.
-        self._taker: int | None = None
+        self._taker: threading.Thread | None = None
         with _lock:
-            _all.append(self)
+            _all.add(self)
 
     def taken(self) -> None:
         """This thread takes a step."""
-        self._taker = threading.get_ident()
+        self._taker = threading.current_thread()
 
     def stop(self) -> None:
         """Have it end after its iteration."""
@@ -35,11 +36,12 @@ class Running:
     def gives_way(self, folder: Path) -> bool:
         """Whether it is given up, where another begins in this folder: it was stopped, or this thread has left it between two
         steps, as Ctrl-C in the body of a loop does."""
-        given_up = self._stopped or self._taker == threading.get_ident()
+        given_up = self._stopped or self._taker is threading.current_thread()
         return given_up and self._folder == folder and not self.native.is_over
 
 
-_all: list[Running] = []
+# None is kept by this: what nobody refers to any more stops.
+_all: weakref.WeakSet[Running] = weakref.WeakSet()
 _lock = threading.Lock()
 
 
@@ -47,7 +49,6 @@ def make_way(folder: Path) -> None:
     """Wait for fits into a folder that were given up."""
     place = folder.resolve()
     with _lock:
-        _all[:] = [running for running in _all if not running.native.is_over]
         given_up = [running for running in _all if running.gives_way(place)]
     for running in given_up:
         running.stop()

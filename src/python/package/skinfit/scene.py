@@ -192,8 +192,8 @@ class Scene:
     def page(self, file: FilePath | None = None, *, player: FilePath | None = None, title: str | None = None) -> Page:
         """The scene at its values as a page for a browser, with sliders, images and fits: `Fit.page` says more. Without a
         `file` it goes with the `Page`."""
-        scratch = Scratch()
-        place = Path(scratch.name) / "page.html" if file is None else Path(file)
+        scratch = Scratch() if file is None else None
+        place = scratch.folder / "page.html" if scratch is not None else Path(str(file))
         with tempfile.TemporaryDirectory(prefix="skinfit-") as changed:
             words = [str(self._file(Path(changed))), *self._cache_words()]
             return page.write([*words, *([] if title is None else [f"--title={title}"])], place, player, scratch)

@@ -13,30 +13,61 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from .errors import SceneError
+from .given import FilePath
 
-# Those that are there now, and the run folders that may name files there.
-_FOLDERS: set[Path] = set()
-_RUNS: set[Path] = set()
+try:
+    import fcntl
+except ImportError:
+    # Windows locks otherwise.
+    fcntl = None  # type: ignore[assignment]
+
+# Those that are there now, each with the run folders that may name its files.
+_FOLDERS: dict[Path, set[Path]] = {}
 
 
 class Scratch:
     """A folder that goes when nothing refers to this any more, or with the process."""
 
     def __init__(self) -> None:
-        self.name = tempfile.mkdtemp(prefix="skinfit-")
-        folder = Path(self.name).resolve()
-        _FOLDERS.add(folder)
-        weakref.finalize(self, _remove, folder, os.getpid())
+        self.folder = Path(tempfile.mkdtemp(prefix="skinfit-")).resolve()
+        _FOLDERS[self.folder] = set()
+        weakref.finalize(self, _remove, self.folder, os.getpid())
+
+
+def named_or_own(given: FilePath | None, name: str) -> tuple[Path, Scratch | None]:
+    """The folder that was named; or one that is called `name`, and goes with what is handed out beside it."""
+    if given is not None:
+        return Path(given), None
+    scratch = Scratch()
+    return scratch.folder / name, scratch
 
 
 def _remove(folder: Path, owner: int) -> None:
     # A process that was forked has no folders of its own.
-    if os.getpid() == owner:
-        for run in sorted(_RUNS):
-            with contextlib.suppress(OSError):
+    if os.getpid() != owner:
+        return
+    for run in sorted(_FOLDERS.pop(folder, ())):
+        # Of a run that was edited since, or is gone, nothing is to be kept.
+        with contextlib.suppress(OSError, ValueError), _locked(run) as free:
+            if free:
                 keep_run(run, run, [folder])
-        _FOLDERS.discard(folder)
-        shutil.rmtree(folder, ignore_errors=True)
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+@contextlib.contextmanager
+def _locked(run: Path) -> Iterator[bool]:
+    """Whether no fit is at work in a run folder; none begins there meanwhile. Its lock is that of the command line."""
+    lock = run / ".lock"
+    if fcntl is None or not lock.exists():
+        yield run.is_dir()
+        return
+    with open(lock, "rb") as held:
+        try:
+            fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            yield False
+            return
+        yield True
 
 
 def write(file: Path, content: bytes) -> None:
@@ -76,10 +107,12 @@ def kept(text: str, folder: Path, files: str) -> str:
     return text
 
 
-def stays(run: Path) -> None:
-    """Keep what a run folder needs. While the scene is there that was fitted, the fit can be gone on with only by the very
-    paths that it began with: files are copied, and named anew, when the scene's folder goes."""
-    _RUNS.add(run.absolute())
+def stays(run: Path, folders: Iterable[Scratch | None]) -> None:
+    """Keep what a run folder needs of these folders of its scenes. While the scenes are there, the fit can be gone on with only
+    by the very paths that it began with: files are copied, and named anew, when their folder goes."""
+    for scratch in folders:
+        if scratch is not None:
+            _FOLDERS[scratch.folder].add(run.absolute())
 
 
 def keep_run(run: Path, to: Path, folders: Iterable[Path] | None = None) -> None:

@@ -20,7 +20,7 @@ from .command import run as run_command
 from .errors import FileError, StudyError, warn
 from .given import FilePath, Names, names
 from .html import framed
-from .scratch import Scratch, copy_run, stays
+from .scratch import Scratch, copy_run, named_or_own, stays
 from .table import Row, best, read_csv
 
 if TYPE_CHECKING:
@@ -184,15 +184,14 @@ def _study(command: str, given: Iterable[Scene], run: FilePath | None, words: Se
     from .scene import scenes_of
 
     scenes = scenes_of(given, StudyError)
-    scratch = Scratch() if run is None else None
-    place = Path(scratch.name) / command if scratch is not None else Path(str(run))
+    place, scratch = named_or_own(run, command)
+    if scratch is None:
+        stays(place, [scene._folder for scene in scenes])
     with tempfile.TemporaryDirectory(prefix="skinfit-") as changed:
         files = [str(scene._file(Path(changed) / str(i))) for i, scene in enumerate(scenes)]
         said = run_command([command, *files, "-o", str(place), *scenes[0]._cache_words(), *words], StudyError)
     if said.failed and not any(place.glob("*.json")):
         raise StudyError("\n".join(said.told))
-    if scratch is None:
-        stays(place)
     warn(said.told)
     return Study(place, said.out, said.failed, scratch)
 
