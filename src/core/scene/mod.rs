@@ -2,7 +2,7 @@
 //!
 //! - [`mesh`]: the mesh as loaded, and posed; [`plain`]: what of it is not skin
 //! - [`view`]: cameras and targets; [`lens`]: what bends their images
-//! - [`maps`]: texture maps and the panorama; [`mip_maps`]: their coarser levels
+//! - [`maps`]: texture maps and the panorama, and `map_files` that they are read of; [`mip_maps`]: their coarser levels
 //! - [`light`]: lights beside it, and the irradiance that they bring
 //! - [`load`]: a scene file and everything that it names; its tables are in `file`, their meaning in
 //!   `settings`, `cameras`, `lights` and `dapple`, within the bounds of `numbers`
@@ -42,6 +42,7 @@ pub mod light;
 mod lights;
 pub(crate) mod lit;
 pub mod load;
+mod map_files;
 pub mod map_fit;
 pub mod maps;
 pub mod mesh;

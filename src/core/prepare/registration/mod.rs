@@ -29,6 +29,7 @@ use crate::scene::mesh::PosedMesh;
 use crate::scene::view::{Camera, View};
 
 use image::Picture;
+use residual::Colors;
 use solve::Found;
 
 /// Images are compared at most at so many pixels along their longer side, which bounds what a step costs.
@@ -107,18 +108,18 @@ fn one(
 ) -> Option<(Camera, bool)> {
     let target = Picture::of_target(view)?;
     let longest = view.camera.width.max(view.camera.height);
-    let mut side = longest.div_ceil(COARSEST).max(1);
     let least = longest.div_ceil(FINEST).max(1);
-    let mut camera = view.camera;
-    loop {
-        let Found { camera: found, settled } =
-            solve::register(&camera, mesh, &target.reduced(side as usize), side, draw)?;
-        camera = found;
-        if side <= least {
-            return Some((camera, settled));
-        }
-        side = (side / 2).max(least);
+    let mut side = longest.div_ceil(COARSEST).max(least);
+    let at = |camera: &Camera, side: u32, colors: Colors| {
+        solve::register(camera, mesh, &target.reduced(side as usize), (side, colors), draw)
+    };
+    let mut camera = at(&view.camera, side, Colors::Whole)?.camera;
+    while side / 2 > least {
+        side /= 2;
+        camera = at(&camera, side, Colors::Whole)?.camera;
     }
+    let Found { camera, settled } = at(&camera, least, Colors::Detail)?;
+    Some((camera, settled))
 }
 
 /// By how many pixels the mesh's vertices lie elsewhere in the image of another camera: median and largest of those that

@@ -4,7 +4,7 @@ use nalgebra::{SMatrix, SVector};
 use rayon::prelude::*;
 
 use super::image::{Picture, reduced_camera};
-use super::residual::{Residual, Weights};
+use super::residual::{Colors, Residual, Weights};
 use super::unknowns::{ALONG, COUNT, FOCAL, Pixels};
 use crate::scene::mesh::PosedMesh;
 use crate::scene::view::Camera;
@@ -45,11 +45,12 @@ pub(super) fn register(
     start: &Camera,
     mesh: &PosedMesh,
     target: &Picture,
-    side: u32,
+    (side, colors): (u32, Colors),
     draw: &(impl Fn(&Camera) -> Option<Picture> + Sync),
 ) -> Option<Found> {
-    let residual =
-        |camera: &Camera| draw(&reduced_camera(camera, side)).map(|drawn| Residual::new(&drawn, target));
+    let residual = |camera: &Camera| {
+        draw(&reduced_camera(camera, side)).map(|drawn| Residual::new(&drawn, target, colors))
+    };
     let mut camera = *start;
     let mut here = residual(&camera)?;
     let mut damping = DAMPING;
