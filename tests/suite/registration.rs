@@ -94,8 +94,8 @@ fn cameras_of_the_built_in_scene_are_found_again() {
         let (start, end) = (apart(&baked, truth, before), apart(&baked, truth, after));
         println!("{}: {start:?} -> {end:?}, settled: {}", moved.view, moved.settled);
         // A tenth of a pixel, from some five; but a profile is turned about its vertical axis without a change of its
-        // silhouette, and what its shading tells of it is off by constants that are not fitted yet.
-        let bounds = if moved.view == "profile" { [0.4, 2.5] } else { [0.1, 0.3] };
+        // silhouette, and of the built-in head's smooth cheek little but shading tells.
+        let bounds = if moved.view == "profile" { [0.25, 2.5] } else { [0.1, 0.3] };
         assert!(start[0] > 2.0 && end[0] < bounds[0], "{}: {start:?} -> {end:?}", moved.view);
         assert!(end[1] < bounds[1] && moved.settled, "{}: {end:?}", moved.view);
         let told = moved.told("scene.toml");
@@ -123,10 +123,11 @@ fn cameras_of_path_traced_heads_end_at_the_same_place_from_anywhere_near() {
         "{start:?} -> {end:?} of one another, {:?} of the truth, which is {bias:?} off",
         apart(&baked, &there[0], &there[2])
     );
-    // Nearly the same optimum from both, as far as the paper's model at its default constants shows such a head; of a
-    // profile's turn there is less to be seen.
-    assert!(start[0] > 2.0 && end[0] < 0.5, "{start:?} -> {end:?}");
-    assert!(bias[0] < 0.2, "{bias:?}");
+    // Nearly the same optimum from both, a tenth of a pixel from the truth, though the paper's model at its default constants
+    // does not light the head as the path tracer does: what is finer than its light tells where it is.
+    let found = apart(&baked, &there[0], &there[2]);
+    assert!(start[0] > 2.0 && end[0] < 0.2, "{start:?} -> {end:?}");
+    assert!(bias[0] < 0.1 && found[0] < 0.1, "{bias:?} {found:?}");
 }
 
 #[test]
