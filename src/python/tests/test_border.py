@@ -134,7 +134,8 @@ def test_an_option_is_refused_in_pythons_words(option: str, value: Any, takes: s
 
 
 def test_options_take_numbers_of_numpys_and_none(small: skinfit.Scene) -> None:
-    found = small.fit(engine="cpu", starts=np.int64(1), max_iterations=None, verify=np.bool_(False))
+    options: Any = {"starts": np.int64(1), "max_iterations": None, "verify": np.bool_(False)}
+    found = small.fit(engine="cpu", **options)
     assert found.converged
 
 

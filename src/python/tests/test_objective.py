@@ -1,5 +1,7 @@
 """Loss, gradient and Jacobian products, against differences and against one another."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 import skinfit
@@ -92,7 +94,8 @@ def test_what_is_no_point_is_refused(objective: skinfit.Objective, x: Vector) ->
         objective.loss(outside)
     with pytest.raises(skinfit.ParamError):
         objective.loss(np.full_like(x, np.nan))
-    for wrong in ("abc", None, x + 1j, [*x[:-1], "0.5"], np.ones(len(x), dtype=bool)):
+    wrongs: list[Any] = ["abc", None, x + 1j, [*x[:-1], "0.5"], np.ones(len(x), dtype=bool)]
+    for wrong in wrongs:
         with pytest.raises(skinfit.ParamError, match="x: holds"):
             objective.loss(wrong)
     with pytest.raises(skinfit.ArrayError, match="complex"):

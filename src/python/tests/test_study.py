@@ -9,6 +9,7 @@ import textwrap
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 import skinfit
@@ -45,10 +46,11 @@ def test_a_study_of_stability_has_a_row_for_each_case(small: skinfit.Scene, unwa
 
 
 def test_a_study_of_no_scene_is_refused_at_once(small: skinfit.Scene, tmp_path: Path) -> None:
+    wrongs: list[Any] = [[], [None], [small.path], small]
     for study in (skinfit.ablate, skinfit.tradeoff, skinfit.stability):
-        for wrong in ([], [None], [small.path], small):
+        for wrong in wrongs:
             with pytest.raises(skinfit.StudyError, match="no scene|no list of scenes"):
-                study(wrong, run=tmp_path / "run")  # type: ignore[operator]
+                study(wrong, run=tmp_path / "run")
     with pytest.raises(skinfit.StudyError, match="no name"):
         small.tradeoff(axes=[3])  # type: ignore[list-item]
     assert not (tmp_path / "run").exists()

@@ -89,7 +89,7 @@ def numbers(
 
 
 def _array(what: str, value: Any, remedy: str, refused: type[Error]) -> NDArray[Any]:
-    if hasattr(value, "mask") and np.ma.isMaskedArray(value):
+    if isinstance(value, np.ma.MaskedArray):
         raise refused(f"{what}: is a masked array, whose mask would be lost. Fill it: array.filled(...).")
     try:
         with warnings.catch_warnings():

@@ -9,9 +9,10 @@ from collections.abc import Iterable, Iterator, Mapping, MutableMapping, Sequenc
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, Union
+from typing import TYPE_CHECKING, Any, Literal, Union
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .errors import ParamError
 from .given import Names, name, names, numbers
@@ -24,6 +25,9 @@ Freedom = Literal["fixed", "tied", "per_channel"]
 
 Value = Union[float, tuple[float, float, float]]
 """One number, or red, green and blue."""
+
+Given = Union[float, "np.number[Any]", Sequence[float], "NDArray[Any]"]
+"""What a parameter is set to: a number, or three."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +81,7 @@ class Params(MutableMapping[str, Value]):
         """The value. Raises `ParamError` where the scene has no such parameter."""
         return self.info(name).value
 
-    def __setitem__(self, name: str, value: float | Sequence[float]) -> None:
+    def __setitem__(self, name: str, value: Given) -> None:
         """Set it to one number, or to three. Raises `ParamError` where it may not have that value."""
         self._scene.set(_name(name), _numbers(name, value))
 
@@ -147,7 +151,7 @@ class Params(MutableMapping[str, Value]):
         defaults = {name: self.info(name).default for name in names or tuple(self)}
         self._set(defaults)
 
-    def set_all(self, values: Mapping[str, float | Sequence[float]]) -> None:
+    def set_all(self, values: Mapping[str, Given]) -> None:
         """Take the values over, as `fit.params`, of this scene or of another.
 
         `SCENE/NAME`, as fits of several scenes have it, is taken where SCENE is this one's file or folder, before a plain
@@ -174,7 +178,7 @@ class Params(MutableMapping[str, Value]):
         self._scene.row(name)
         return True
 
-    def _set(self, values: Mapping[str, float | Sequence[float]]) -> None:
+    def _set(self, values: Mapping[str, Given]) -> None:
         """Set all of these, or none."""
         before = self._scene.rows()
         try:
@@ -235,7 +239,7 @@ def _names(given: Names) -> list[str]:
     return names(given, ParamError)
 
 
-def _numbers(name: str, value: float | Sequence[float]) -> list[float]:
+def _numbers(name: str, value: Given) -> list[float]:
     """One number, or more; how many there may be the library says."""
     remedy = "Give a number, or three of red, green and blue."
     taken = numbers(name, value, np.float64, remedy, kinds="fiu", finite=False, refused=ParamError)
