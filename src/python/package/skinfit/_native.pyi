@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from typing_extensions import disjoint_base
 
 __all__ = [
+    "_panic",
     "Constants",
     "Fitting",
     "MapObjective",
