@@ -64,6 +64,16 @@ def test_ctrl_c_keeps_what_there_is(small_file: Path, cache: Path, tmp_path: Pat
     assert skinfit.load_run(tmp_path / "run").ending == "interrupted"
 
 
+def interrupted(script: str, after: str, seconds: float) -> tuple[float, list[str]]:
+    """When a script was interrupted, so many seconds after a word, and the words of its next line."""
+    with running(script) as process:
+        assert process.stdout is not None and process.stdout.readline() == f"{after}\n"
+        time.sleep(seconds)
+        sent = time.time()
+        process.send_signal(signal.SIGINT)
+        return sent, process.stdout.readline().split()
+
+
 _AT_WORK = """
     import time
     import skinfit
@@ -79,13 +89,8 @@ _AT_WORK = """
 
 def test_ctrl_c_is_heard_within_a_second_while_the_library_works(demo_file: Path, cache: Path) -> None:
     script = textwrap.dedent(_AT_WORK.format(scene=str(demo_file), cache=str(cache)))
-    with running(script) as process:
-        assert process.stdout is not None and process.stdout.readline() == "begun\n"
-        time.sleep(0.5)
-        sent = time.time()
-        process.send_signal(signal.SIGINT)
-        word, heard = process.stdout.readline().split()
-        assert word == "interrupted" and float(heard) - sent < 1.0
+    sent, (word, heard) = interrupted(script, after="begun", seconds=0.5)
+    assert word == "interrupted" and float(heard) - sent < 1.0
 
 
 _SEARCHING = """
@@ -105,12 +110,7 @@ _SEARCHING = """
 
 def test_ctrl_c_ends_a_long_search_within_a_second(demo_file: Path, cache: Path) -> None:
     script = textwrap.dedent(_SEARCHING.format(scene=str(demo_file), cache=str(cache)))
-    with running(script) as process:
-        assert process.stdout is not None and process.stdout.readline() == "step\n"
-        time.sleep(1.0)
-        sent = time.time()
-        process.send_signal(signal.SIGINT)
-        ending, last, over = process.stdout.readline().split()
+    sent, (ending, last, over) = interrupted(script, after="step", seconds=1.0)
     assert ending == "interrupted" and float(last) - sent < 1.0
     # The report of three views is written, too: some seconds on two slow cores.
     assert float(over) - sent < 30.0
