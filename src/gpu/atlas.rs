@@ -25,7 +25,7 @@ use super::readback::Copy;
 use super::targets::{Tile, texture_for};
 use super::timing::Timer;
 use super::upload::{Bound, Content, Uploads};
-use crate::scene::mesh::{Mesh, tile_outside_atlas};
+use crate::scene::mesh::tile_outside_atlas;
 use crate::scene::view::Camera;
 use crate::shader::Plan;
 use crate::shader::atlas::{Level, Pass};
@@ -65,8 +65,8 @@ impl Atlas {
     pub(super) fn new(gpu: &Gpu, plan: &Plan, uploads: &mut Uploads) -> Result<Option<Self>, GpuError> {
         let Some(size) = plan.facts.atlas.filter(|_| !plan.passes.is_empty()) else { return Ok(None) };
         check(gpu, size, uploads)?;
-        let Mesh { uvs, triangles, .. } = &uploads.content().scene.mesh;
-        let texels = Texels::new(gpu, uvs, triangles, size)?;
+        let uvs = &uploads.content().scene.mesh.uvs;
+        let texels = Texels::new(gpu, uvs, uploads.triangles().of_skin(), size)?;
         let mut atlas = Self {
             levels: HashMap::new(),
             passes: Vec::with_capacity(plan.passes.len()),

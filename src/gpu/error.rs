@@ -100,7 +100,7 @@ pub enum GpuError {
         adapter: String,
     },
     /// The scene has what adapters do not draw.
-    #[error("{what}, which the CPU engine alone draws.")]
+    #[error("{what}, which adapters do not take.")]
     CpuAlone {
         /// That it has it.
         what: String,
@@ -164,5 +164,13 @@ impl GpuError {
     /// When it has what the CPU engine alone draws.
     pub fn check_drawn(scene: &Scene) -> Result<(), Self> {
         scene.cpu_alone().map_or(Ok(()), |what| Err(Self::CpuAlone { what }))
+    }
+
+    /// Whether adapters make samples of a scene.
+    ///
+    /// # Errors
+    /// When the CPU alone does.
+    pub fn check_sampled(scene: &Scene) -> Result<(), Self> {
+        scene.cpu_samples().map_or(Ok(()), |what| Err(Self::CpuAlone { what }))
     }
 }

@@ -4,12 +4,13 @@
 //! - [`adapter`]: which adapters there are, and which one is taken
 //! - [`device`]: the device on it, and what went wrong there
 //! - [`upload`]: what a plan reads, on the device (`texels`: in the formats that it is read in;
-//!   `vertices`: the mesh at rest, its morph targets and bones)
+//!   `vertices`: the mesh at rest, its morph targets and bones; `triangles`: in which order)
 //! - `constants`: the uniform block
 //! - `targets`: what is drawn into, in tiles where an image with its samples is too large for one
 //! - `program`: a plan on the device: its `pipeline` (`formats`: what that reads, in wgpu's words), and before it its passes over the UV atlas ([`atlas`])
 //! - `visibility_buffer`: a plan that compute shaders evaluate; `compute`: what they are made with
 //! - `shadow`: shadow maps: what each light sees first
+//! - `plain`: what is not skin, by its own material
 //! - `filter`: passes over whole images: `resolve` (samples to pixels) and `bloom`
 //! - `geometry`: what is stored of each sample, drawn instead of shaded: the GPU engine's samples
 //! - `records`: where the numbers of a stored sample stand on the device
@@ -41,6 +42,7 @@ mod formats;
 pub(crate) mod geometry;
 pub mod painter;
 mod pipeline;
+mod plain;
 pub mod probe;
 mod program;
 pub(crate) mod readback;
@@ -52,6 +54,7 @@ mod stage;
 mod targets;
 pub(crate) mod texels;
 pub mod timing;
+mod triangles;
 pub mod upload;
 mod vertices;
 mod visibility_buffer;

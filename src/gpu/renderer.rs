@@ -5,10 +5,12 @@ mod made;
 
 use glam::Mat4;
 use std::sync::Arc;
+use wgpu::RenderPipeline;
 
 use super::atlas::AtlasTraffic;
 use super::device::Gpu;
 use super::error::GpuError;
+use super::plain::{Plain, Show};
 use super::program::{Program, Shaded};
 use super::stage::{End, Stage};
 use super::timing::PassTime;
@@ -60,12 +62,49 @@ pub struct Renderer {
     facts: Facts,
     /// Weights of the kept morph targets.
     morph_weights: Vec<f32>,
-    /// The whole, and terms that were asked for.
-    programs: Vec<Program<Shaded>>,
+    /// The whole, and parts of it that were asked for.
+    programs: Vec<Drawer>,
+    /// What is not skin, where the mesh has such parts.
+    plain: Option<Plain>,
     stages: Vec<Stage>,
     background: Background,
     /// What stands behind the mesh, as the camera of the last frame sees it.
     backdrop: Option<(Camera, Backdrop)>,
+}
+
+/// What an image shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Layer {
+    /// All of it.
+    Whole,
+    /// One term of the skin.
+    Term(TermName),
+    /// What is not skin.
+    Plain,
+}
+
+/// What draws a layer.
+struct Drawer {
+    layer: Layer,
+    /// The skin's.
+    program: Program<Shaded>,
+    /// That of what is not skin, where there is any.
+    plain: Option<RenderPipeline>,
+}
+
+impl Layer {
+    /// How what is not skin is drawn into it.
+    const fn shows_plain(self) -> Show {
+        match self {
+            Self::Whole | Self::Plain => Show::Lit,
+            Self::Term(_) => Show::Hidden,
+        }
+    }
+
+    /// Whether the skin's alpha is the haze there.
+    fn is_hazy(self, plan: &Plan) -> bool {
+        self == Self::Whole && plan.facts.needs().haze
+    }
 }
 
 impl Renderer {
@@ -82,7 +121,8 @@ impl Renderer {
             morphs: targets.len() as u32,
             ..Facts::of_scene(&content.scene, &content.params, options.budget, gpu.f16())
         };
-        let uploads = Uploads::new(gpu, content, targets)?;
+        let mut uploads = Uploads::new(gpu, content, targets)?;
+        let plain = Plain::new(gpu, &facts, &mut uploads)?;
         let mut renderer = Self {
             gpu: gpu.clone(),
             uploads,
@@ -90,11 +130,12 @@ impl Renderer {
             facts,
             morph_weights,
             programs: Vec::new(),
+            plain,
             stages: Vec::new(),
             background: Background::None,
             backdrop: None,
         };
-        renderer.program(None)?;
+        renderer.program(Layer::Whole)?;
         Ok(renderer)
     }
 
@@ -111,14 +152,14 @@ impl Renderer {
     ) -> Result<Self, GpuError> {
         let mut renderer = Self::new(gpu, content, options)?;
         let plan = change(renderer.plan());
-        renderer.programs[0] = renderer.compiled(plan)?;
+        renderer.programs[0].program = renderer.compiled(Layer::Whole, plan)?;
         Ok(renderer)
     }
 
     /// The plan of the whole image.
     #[must_use]
     pub fn plan(&self) -> &Plan {
-        self.programs[0].plan()
+        self.programs[0].program.plan()
     }
 
     /// Bytes of mesh, maps and cubes on the device.
@@ -148,13 +189,13 @@ impl Renderer {
     /// What the whole image's passes over the UV atlas take.
     #[must_use]
     pub fn atlas_traffic(&self) -> AtlasTraffic {
-        self.programs[0].atlas_traffic()
+        self.programs[0].program.atlas_traffic()
     }
 
     /// How often the levels of the UV atlas were made for the whole image: once, and again where the mesh has moved.
     #[must_use]
     pub fn atlas_made(&self) -> u64 {
-        self.programs[0].atlas_made()
+        self.programs[0].program.atlas_made()
     }
 
     /// Put something behind the mesh in the frames to come.
@@ -171,7 +212,10 @@ impl Renderer {
     /// When something was baked for another mesh.
     pub fn set_mesh(&mut self, mesh: &Mesh, own: Option<&PoseBake>) -> Result<(), GpuError> {
         self.uploads.set_mesh(&self.gpu, mesh, own)?;
-        self.programs.iter().for_each(Program::forget);
+        if let Some(plain) = &self.plain {
+            plain.set_mesh(&self.gpu, &self.uploads, mesh);
+        }
+        self.forget();
         let weights = mesh.morphs.iter().map(|morph| morph.weight);
         self.morph_weights.iter_mut().zip(weights).for_each(|(old, new)| *old = new);
         Ok(())
@@ -184,8 +228,11 @@ impl Renderer {
     /// # Errors
     /// As of [`set_mesh`](Self::set_mesh).
     pub fn set_pose(&mut self, bones: &[Mat4], weights: &[f32]) -> Result<(), GpuError> {
-        self.uploads.set_pose(&self.gpu, bones, weights)?;
-        self.programs.iter().for_each(Program::forget);
+        match self.uploads.posed_whole(bones, weights) {
+            Some(mesh) => return self.set_mesh(&mesh, None),
+            None => self.uploads.set_pose(&self.gpu, bones),
+        }
+        self.forget();
         let own = &self.uploads.content().scene.mesh.morphs;
         for (i, (weight, own)) in self.morph_weights.iter_mut().zip(own).enumerate() {
             *weight = weights.get(i).copied().unwrap_or(own.weight);
@@ -210,9 +257,12 @@ impl Renderer {
     /// # Errors
     /// As of [`Self::new`].
     pub fn set_params(&mut self, params: &Params) -> Result<(), GpuError> {
-        let turned = self.uploads.content().params.scalar(Param::EnvironmentRotation);
-        if self.facts.at(params) == self.facts && self.uploads.set_params(params) {
-            self.programs.iter().for_each(Program::forget);
+        let before = &self.uploads.content().params;
+        let turned = before.scalar(Param::EnvironmentRotation);
+        // What is not skin is lit when it is made.
+        let lit = self.plain.is_none() || params.differ_in_weights_alone(before);
+        if lit && self.facts.at(params) == self.facts && self.uploads.set_params(params) {
+            self.forget();
         } else {
             let (background, mut content) = (self.background, self.uploads.content().clone());
             Arc::make_mut(&mut content.scene).params = params.clone();
@@ -226,6 +276,11 @@ impl Renderer {
         Ok(())
     }
 
+    /// Have passes over the UV atlas run again.
+    fn forget(&self) {
+        self.programs.iter().for_each(|drawer| drawer.program.forget());
+    }
+
     /// The image that `camera` sees, times `gain`.
     ///
     /// # Errors
@@ -233,7 +288,7 @@ impl Renderer {
     pub fn render(&mut self, camera: &Camera, gain: impl Into<Gain>) -> Result<Frame, GpuError> {
         let gain = gain.into();
         self.show_behind(camera);
-        let drawn = self.draw(None, camera, gain, End::Finished)?;
+        let drawn = self.draw(Layer::Whole, camera, gain, End::Finished)?;
         let (image, clipped) = self.stages[drawn.stage].finished_image(&drawn.planes, gain);
         Ok(Frame { image, clipped, times: drawn.times })
     }
@@ -245,7 +300,7 @@ impl Renderer {
     pub async fn render_async(&mut self, camera: &Camera, gain: impl Into<Gain>) -> Result<Frame, GpuError> {
         let gain = gain.into();
         self.show_behind(camera);
-        let (stage, planes) = self.draw_async(None, camera, gain, End::Finished).await?;
+        let (stage, planes) = self.draw_async(Layer::Whole, camera, gain, End::Finished).await?;
         let (image, clipped) = self.stages[stage].finished_image(&planes, gain);
         Ok(Frame { image, clipped, times: Vec::new() })
     }
@@ -261,7 +316,7 @@ impl Renderer {
         gain: impl Into<Gain>,
     ) -> Result<Image, GpuError> {
         let gain = gain.into();
-        let (stage, planes) = self.draw_async(Some(term), camera, gain, End::Parts).await?;
+        let (stage, planes) = self.draw_async(Layer::Term(term), camera, gain, End::Parts).await?;
         Ok(self.stages[stage].image(&planes, gain).0)
     }
 
@@ -275,22 +330,22 @@ impl Renderer {
         gain: impl Into<Gain>,
     ) -> Result<Vec<f32>, GpuError> {
         let gain = gain.into();
-        if !hazy(self.plan()) {
+        if !Layer::Whole.is_hazy(self.plan()) {
             return Ok(Vec::new());
         }
-        let (stage, planes) = self.draw_async(None, camera, gain, End::Parts).await?;
+        let (stage, planes) = self.draw_async(Layer::Whole, camera, gain, End::Parts).await?;
         Ok(self.haze(stage, &planes, gain))
     }
 
     /// Submit, and the planes of the stage once they are there.
     async fn draw_async(
         &mut self,
-        output: Option<TermName>,
+        layer: Layer,
         camera: &Camera,
         gain: Gain,
         end: End,
     ) -> Result<(usize, Vec<Vec<f32>>), GpuError> {
-        let (stage, copies) = self.submit(output, camera, gain, end, None)?;
+        let (stage, copies) = self.submit(layer, camera, gain, end, None)?;
         let mut planes = Vec::with_capacity(copies.len());
         for copy in &copies {
             planes.push(copy.arrived(&self.gpu).await?);
@@ -317,8 +372,42 @@ impl Renderer {
         gain: impl Into<Gain>,
     ) -> Result<Image, GpuError> {
         let gain = gain.into();
-        let drawn = self.draw(Some(term), camera, gain, End::Parts)?;
+        let drawn = self.draw(Layer::Term(term), camera, gain, End::Parts)?;
         Ok(self.stages[drawn.stage].image(&drawn.planes, gain).0)
+    }
+
+    /// What is not skin alone, without bloom and backdrop; `None` where all of the mesh is skin.
+    ///
+    /// # Errors
+    /// As of [`Self::render`].
+    pub fn render_plain(
+        &mut self,
+        camera: &Camera,
+        gain: impl Into<Gain>,
+    ) -> Result<Option<Image>, GpuError> {
+        if self.plain.is_none() {
+            return Ok(None);
+        }
+        let gain = gain.into();
+        let drawn = self.draw(Layer::Plain, camera, gain, End::Parts)?;
+        Ok(Some(self.stages[drawn.stage].image(&drawn.planes, gain).0))
+    }
+
+    /// As [`Self::render_plain`], without waiting.
+    ///
+    /// # Errors
+    /// As of [`Self::render`].
+    pub async fn render_plain_async(
+        &mut self,
+        camera: &Camera,
+        gain: impl Into<Gain>,
+    ) -> Result<Option<Image>, GpuError> {
+        if self.plain.is_none() {
+            return Ok(None);
+        }
+        let gain = gain.into();
+        let (stage, planes) = self.draw_async(Layer::Plain, camera, gain, End::Parts).await?;
+        Ok(Some(self.stages[stage].image(&planes, gain).0))
     }
 
     /// The haze of each pixel, premultiplied by its coverage and times the gain; empty where no effect makes one.
@@ -327,10 +416,10 @@ impl Renderer {
     /// As of [`Self::render`].
     pub fn render_haze(&mut self, camera: &Camera, gain: impl Into<Gain>) -> Result<Vec<f32>, GpuError> {
         let gain = gain.into();
-        if !hazy(self.plan()) {
+        if !Layer::Whole.is_hazy(self.plan()) {
             return Ok(Vec::new());
         }
-        let drawn = self.draw(None, camera, gain, End::Parts)?;
+        let drawn = self.draw(Layer::Whole, camera, gain, End::Parts)?;
         Ok(self.haze(drawn.stage, &drawn.planes, gain))
     }
 
@@ -358,9 +447,4 @@ impl Renderer {
             }
         }
     }
-}
-
-/// Whether a plan's alpha is the haze.
-fn hazy(plan: &Plan) -> bool {
-    plan.facts.needs().haze && plan.facts.output.is_none()
 }

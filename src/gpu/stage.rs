@@ -2,17 +2,19 @@
 
 use wgpu::{
     Color, CommandEncoder, LoadOp, Operations, RenderPassColorAttachment, RenderPassDepthStencilAttachment,
-    RenderPassDescriptor, RenderPassTimestampWrites, StoreOp, TextureView,
+    RenderPassDescriptor, RenderPassTimestampWrites, RenderPipeline, StoreOp, TextureView,
 };
 
 use super::bloom::Finish;
 use super::device::Gpu;
 use super::pipeline::Pipeline;
+use super::plain::Plain;
 use super::program::{Program, Shaded};
 use super::readback::Copy;
 use super::resolve::Resolve;
 use super::targets::{Planes, Targets, Tile};
 use super::timing::Timer;
+use super::upload::Uploads;
 use crate::model::gain::Gain;
 use crate::render::image::Image;
 
@@ -21,6 +23,14 @@ pub(super) struct Stage {
     pub(super) targets: Targets,
     pub(super) resolve: Option<Resolve>,
     pub(super) finish: Option<Finish>,
+}
+
+/// What is drawn into a stage.
+pub(super) struct Drawn<'a> {
+    pub(super) program: &'a Program<Shaded>,
+    /// What is not skin, and what draws it.
+    pub(super) plain: Option<(&'a Plain, &'a RenderPipeline)>,
+    pub(super) uploads: &'a Uploads,
 }
 
 /// How a frame ends.
@@ -45,19 +55,19 @@ impl Stage {
         &self,
         gpu: &Gpu,
         encoder: &mut CommandEncoder,
-        program: &Program<Shaded>,
+        shown: &Drawn<'_>,
         tile: Tile,
         first: bool,
         mut timer: Option<&mut Timer>,
     ) {
         if first {
-            program.prepare(encoder, timer.as_deref_mut());
+            shown.program.prepare(encoder, timer.as_deref_mut());
         }
         let targets = &self.targets;
         let drawn = targets.samples.as_ref().unwrap_or(&targets.pixels);
-        match &program.pipelines {
+        match &shown.program.pipelines {
             Shaded::Forward(pipeline) => {
-                self.encode_raster(encoder, pipeline, drawn, tile, timer.as_deref_mut());
+                self.encode_raster(encoder, (pipeline, shown), drawn, tile, timer.as_deref_mut());
             }
             Shaded::Computed(buffer) => {
                 buffer.encode(gpu, encoder, (targets, drawn), tile, timer.as_deref_mut());
@@ -86,7 +96,7 @@ impl Stage {
     fn encode_raster(
         &self,
         encoder: &mut CommandEncoder,
-        pipeline: &Pipeline,
+        (pipeline, shown): (&Pipeline, &Drawn<'_>),
         drawn: &Planes,
         tile: Tile,
         mut timer: Option<&mut Timer>,
@@ -107,6 +117,9 @@ impl Stage {
         let (width, height) = ((n * tile.width) as f32, (n * tile.height) as f32);
         pass.set_viewport(0.0, 0.0, width, height, 0.0, 1.0);
         pipeline.draw(&mut pass);
+        if let Some((plain, pipeline)) = shown.plain {
+            plain.draw(&mut pass, pipeline, shown.uploads);
+        }
     }
 
     /// After the last tile: what stands behind the mesh and the bloom, and copies of what the image is made of, as far as

@@ -43,24 +43,48 @@ pub(crate) fn faces(cube: &Cube<f32>) -> Texels {
 
 /// Six faces in 16 bits, whose borders the hardware bridges. Radiance beyond their range is cut at it, and counted.
 pub(super) fn cube(cube: &Cube<f32>) -> Texels {
-    let size = cube.size();
-    let places = (0..6)
-        .flat_map(|face| (0..size).flat_map(move |row| (0..size).map(move |column| (face, column, row))));
-    let mut halves: Vec<[u8; 2]> = Vec::with_capacity(24 * size * size);
-    let mut clipped = 0;
-    for (face, column, row) in places {
-        let texel = cube.texel(face, column, row);
-        clipped += usize::from(texel.iter().any(|x| x.abs() > LARGEST_HALF));
-        halves.extend(texel.map(half));
+    cubes(std::slice::from_ref(cube))
+}
+
+/// The same of several, each of half the size of the one before, as levels; of none, one texel a face that is black.
+pub(super) fn cubes(levels: &[Cube<f32>]) -> Texels {
+    let black = [Cube::from_fn(1, |_, _, _| [0.0; 4])];
+    let levels = if levels.is_empty() { &black[..] } else { levels };
+    let size = levels[0].size();
+    let (mut halves, mut clipped) = (Vec::<[u8; 2]>::new(), 0);
+    for face in 0..6 {
+        for cube in levels {
+            let side = cube.size();
+            for (row, column) in (0..side).flat_map(|row| (0..side).map(move |column| (row, column))) {
+                let texel = cube.texel(face, column, row);
+                clipped += usize::from(texel.iter().any(|x| x.abs() > LARGEST_HALF));
+                halves.extend(texel.map(half));
+            }
+        }
     }
     Texels {
         width: size as u32,
         height: size as u32,
         layers: 6,
-        levels: 1,
+        levels: levels.len() as u32,
         format: TextureFormat::Rgba16Float,
         dimension: TextureViewDimension::Cube,
         bytes: halves.as_flattened().to_vec(),
+        clipped,
+    }
+}
+
+/// A picture of a material in 16 bits.
+pub(crate) fn picture(map: &Map<4>) -> Texels {
+    let clipped = map.texels.iter().filter(|texel| texel.iter().any(|x| x.abs() > LARGEST_HALF)).count();
+    Texels {
+        width: map.width as u32,
+        height: map.height as u32,
+        layers: 1,
+        levels: 1,
+        format: TextureFormat::Rgba16Float,
+        dimension: TextureViewDimension::D2,
+        bytes: map.texels.iter().flatten().flat_map(|&x| half(x)).collect(),
         clipped,
     }
 }

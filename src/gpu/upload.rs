@@ -16,6 +16,7 @@ use super::error::{GpuError, Oversized};
 use super::shadow::{self, Mapped};
 use super::texels::{self, Texels};
 use super::timing::Timer;
+use super::triangles::Triangles;
 use super::vertices;
 use crate::bake::rays::RayMesh;
 use crate::bake::stacks::Stack;
@@ -82,6 +83,8 @@ pub(super) struct Uploads {
     mapped: Vec<Mapped>,
     shadow_maps: Option<shadow::Maps>,
     indices: Buffer,
+    /// What `indices` holds.
+    triangles: Triangles,
     /// Bytes that were uploaded.
     bytes: u64,
     /// Texels that were cut at the end of their format's range.
@@ -128,11 +131,12 @@ impl Uploads {
         let mapped = shadow::mapped(&content.scene, &content.params);
         content.params = shadow::with_layers(content.params, &mapped);
         let mesh = split.as_ref().map_or(&content.scene.mesh, |(mesh, _)| mesh);
-        let triangles = bytemuck::cast_slice(&mesh.triangles);
-        let indices = buffer(gpu, "triangles", triangles, BufferUsages::INDEX | BufferUsages::STORAGE)?;
+        let triangles = Triangles::of(mesh);
+        let corners = bytemuck::cast_slice(&triangles.corners);
+        let indices = buffer(gpu, "triangles", corners, BufferUsages::INDEX | BufferUsages::STORAGE)?;
+        let bytes = corners.len() as u64;
         let looked_up = |stack: Stack| stack.at(&content.illumination, stack.place(&content.params));
         let stacks = Stack::ALL.map(|stack| looked_up(stack).map(|(cube, _)| cube));
-        let bytes = triangles.len() as u64;
         Ok(Self {
             content,
             split,
@@ -145,6 +149,7 @@ impl Uploads {
             mapped,
             shadow_maps: None,
             indices,
+            triangles,
             bytes,
             clipped: 0,
         })
@@ -188,9 +193,24 @@ impl Uploads {
         self.mesh().0.positions.len() as u64
     }
 
-    /// Three for each triangle.
-    pub(super) fn index_count(&self) -> u32 {
-        3 * self.content.scene.mesh.triangles.len() as u32
+    /// What they are the vertices of.
+    pub(super) const fn triangles(&self) -> &Triangles {
+        &self.triangles
+    }
+
+    /// Three for each triangle of skin, which come first.
+    pub(super) const fn index_count(&self) -> u32 {
+        3 * self.triangles.skin
+    }
+
+    /// Count bytes that were uploaded beside.
+    pub(super) const fn add_bytes(&mut self, bytes: u64) {
+        self.bytes += bytes;
+    }
+
+    /// Count texels beside that were cut.
+    pub(super) const fn add_clipped(&mut self, texels: usize) {
+        self.clipped += texels;
     }
 
     pub(super) const fn bytes(&self) -> u64 {
@@ -360,22 +380,32 @@ impl Uploads {
         Ok(Bound::Buffer(buffer(gpu, what, bytes, BufferUsages::STORAGE)?))
     }
 
-    /// Put other bones, and with the targets' weights what is found at vertices, in place of those that are on the device.
-    pub(super) fn set_pose(&mut self, gpu: &Gpu, bones: &[Mat4], weights: &[f32]) -> Result<(), GpuError> {
+    /// The whole mesh in a pose of those bones and weights, where what is on the device goes by more than these: shadows
+    /// and what is found at vertices are of the posed surface, which the processor knows of the whole mesh.
+    pub(super) fn posed_whole(&self, bones: &[Mat4], weights: &[f32]) -> Option<Mesh> {
         let mesh = &self.content.scene.mesh;
-        let mut posed = mesh.bones.clone();
-        posed.iter_mut().zip(bones).for_each(|(old, new)| *old = *new);
         let finds = self.attributes.keys().any(|attribute| matches!(attribute, Attribute::Field(_)));
-        if self.shadow_maps.is_some() || finds {
-            // Shadows and what is found at vertices are of the posed surface, which the processor knows of the whole mesh.
-            let mut mesh = Mesh { bones: posed, ..mesh.clone() };
-            mesh.morphs.iter_mut().zip(weights).for_each(|(morph, weight)| morph.weight = *weight);
-            return self.set_mesh(gpu, &mesh, None);
+        if self.shadow_maps.is_none() && !finds && mesh.plain.is_none() {
+            return None;
         }
+        let mut mesh = Mesh { bones: self.posed(bones), ..mesh.clone() };
+        mesh.morphs.iter_mut().zip(weights).for_each(|(morph, weight)| morph.weight = *weight);
+        Some(mesh)
+    }
+
+    /// Put other bones in place of those that are on the device.
+    pub(super) fn set_pose(&self, gpu: &Gpu, bones: &[Mat4]) {
         if let Some(Bound::Buffer(buffer)) = self.resources.get(&Resource::Bones) {
-            gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&vertices::bones(&posed)));
+            let rows = vertices::bones(&self.posed(bones));
+            gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&rows));
         }
-        Ok(())
+    }
+
+    /// The mesh's bones, those that are given in the place of its own.
+    fn posed(&self, bones: &[Mat4]) -> Vec<Mat4> {
+        let mut posed = self.content.scene.mesh.bones.clone();
+        posed.iter_mut().zip(bones).for_each(|(old, new)| *old = *new);
+        posed
     }
 
     /// Put another pose of the mesh (the same vertices at another time) in place of the one that is on the

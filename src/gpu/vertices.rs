@@ -10,6 +10,7 @@ use crate::model::vertex::Bone;
 use crate::scene::charts::charts;
 use crate::scene::mesh::{Mesh, Morph, VertexField};
 use crate::shader::Attribute;
+use crate::triangles::Triangles;
 
 /// One attribute of every vertex, as bytes; what the mesh lacks is zero, which the vertex stage takes for
 /// "no direction", and occlusion 1; `fields` holds what is found of what a file of rules declares.
@@ -34,7 +35,7 @@ pub(super) fn attribute(
         Attribute::Weights => floats((0..count).flat_map(|i| influences(mesh, i).1).collect()),
         Attribute::Field(of) => floats(fields.get(&of).cloned().unwrap_or_default()),
         Attribute::Chart => {
-            let charts = charts(&mesh.positions, &mesh.uvs, &mesh.triangles);
+            let charts = charts(&mesh.positions, &mesh.uvs, Triangles::of(mesh).of_skin());
             floats(charts.into_iter().map(|chart| chart as f32).collect())
         }
         Attribute::Corner => floats(corner_marks(count).into_flattened()),

@@ -39,6 +39,12 @@ impl LobeSky {
         Self(levels)
     }
 
+    /// The cubes, the finest first.
+    #[must_use]
+    pub fn levels(&self) -> &[Cube<f32>] {
+        &self.0
+    }
+
     /// The mean radiance about the unit direction `d` over a solid angle, steradians, rgb.
     #[must_use]
     pub fn along(&self, d: Vec3A, solid_angle: f64) -> [f64; 3] {

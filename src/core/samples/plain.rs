@@ -8,15 +8,14 @@ use std::f64::consts::PI;
 use glam::{DVec3, Vec3A};
 use rayon::prelude::*;
 
-use super::PosedSurface;
 use super::trace::Hit;
 use super::visibility::{Place, Places, Shadows};
+use super::{PosedSurface, plain_vertices};
 use crate::bake::lobe_sky::LobeSky;
 use crate::bake::low_discrepancy::{Sobol, mix};
 use crate::bake::rays::RayMesh;
 use crate::bake::vertex_rays::frame;
 use crate::bake::wide_bvh::NOTHING;
-use crate::model::effects::Effect;
 use crate::scene::Scene;
 use crate::scene::light::{Light, LightKind};
 use crate::scene::plain::{PlainMaterial, PlainSurface};
@@ -63,12 +62,11 @@ pub(super) fn pixels(
     if hits.is_empty() {
         return Vec::new();
     }
-    let lit = scene.effects.has(Effect::Lights);
     let light = PlainLight {
         rays: posed.rays,
         shadows: Shadows::new(posed.mesh, posed.rays, scene.quality.shadow_rays),
         sky: LobeSky::of_scene(scene),
-        lights: scene.lights.iter().chain(&scene.sky_lights).filter(|_| lit).collect(),
+        lights: plain_vertices::lights(scene),
         spread: Sobol::new(RAYS),
     };
     let eye = camera.eye();

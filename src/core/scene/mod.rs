@@ -150,10 +150,14 @@ impl Scene {
     pub fn cpu_alone(&self) -> Option<String> {
         // A rasteriser draws straight edges straight.
         let bent = self.views.iter().find(|view| view.camera.lens.distortion.is_some());
-        match bent {
-            Some(view) => Some(format!("view \"{}\" has a lens that bends what is straight", view.name)),
-            None => self.mesh.plain.as_ref().map(|_| "the mesh has parts that are not skin".to_owned()),
-        }
+        bent.map(|view| format!("view \"{}\" has a lens that bends what is straight", view.name))
+    }
+
+    /// Why the CPU alone makes samples of the scene, in words; `None` where adapters make them, too.
+    #[must_use]
+    pub fn cpu_samples(&self) -> Option<String> {
+        let parts = || self.mesh.plain.as_ref().map(|_| "the mesh has parts that are not skin".to_owned());
+        self.cpu_alone().or_else(parts)
     }
 
     /// The switches of the model.

@@ -21,6 +21,17 @@ impl Plan {
 
     /// As [`vertex_module`](Self::vertex_module), the position being `clip`, a `vec4f`.
     pub(super) fn vertex_module_at(&self, position: &str, clip: &str) -> String {
+        self.vertex_text(position, clip, "@vertex\nfn vs_main")
+    }
+
+    /// As [`vertex_module`](Self::vertex_module), the vertex stage being a function of that name, for entry points that
+    /// hand over more.
+    #[must_use]
+    pub fn vertex_function(&self, name: &str) -> String {
+        self.vertex_text("", "clip", &format!("fn {name}"))
+    }
+
+    fn vertex_text(&self, position: &str, clip: &str, function: &str) -> String {
         let mut wgsl = self.declarations(true);
         wgsl.push_str("\nstruct Vertex {\n    @builtin(vertex_index) vertex_index: u32,\n");
         for (i, attribute) in self.attributes.iter().enumerate() {
@@ -30,7 +41,7 @@ impl Plan {
         for (i, (name, kind)) in self.varyings.iter().enumerate() {
             let _ = writeln!(wgsl, "    @location({i}) {name}: {kind},");
         }
-        wgsl.push_str("}\n\n@vertex\nfn vs_main(vertex: Vertex) -> Varyings {\n");
+        let _ = write!(wgsl, "}}\n\n{function}(vertex: Vertex) -> Varyings {{\n");
         wgsl.push_str(&self.calls(Domain::Vertex, uniform, |name| format!("vertex.{name}")));
         let varyings: String = self.varyings.iter().map(|(name, _)| format!(", {name}")).collect();
         let _ = write!(wgsl, "    return Varyings({clip}{varyings});\n}}\n");

@@ -58,7 +58,7 @@ impl DeviceSamples {
         if let Some(field) = scene.needs().fields.iter().find(|field| !field.is_of_vertices()) {
             return Err(GpuError::Plan(PlanError::not_found_on_adapters(field.name()).to_string()).into());
         }
-        GpuError::check_drawn(scene)?;
+        GpuError::check_sampled(scene)?;
         if scene.needs().atlas {
             // Texels are the CPU's, as are the samples' places in them.
             return Err(GpuError::Plan(PlanError::no_atlas(scene.effects).to_string()).into());

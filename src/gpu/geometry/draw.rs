@@ -72,7 +72,7 @@ pub(super) fn draws(facts: &Facts, places: &Places) -> Result<Vec<Draw>, PlanErr
 }
 
 /// Fragments of the rasteriser, filtered in the shader, and no atlas: what the CPU's samples are.
-fn raster(facts: &Facts) -> Facts {
+pub(crate) fn raster(facts: &Facts) -> Facts {
     Facts { source: Source::Raster, output: None, atlas: None, shadows: None, ..*facts }
 }
 

@@ -21,8 +21,8 @@ use rayon::prelude::*;
 use wgpu::{Buffer, BufferUsages, CommandEncoder, CommandEncoderDescriptor};
 
 use self::compute::{Coverage, Gather};
-pub(crate) use self::draw::outline;
 use self::draw::{ELSEWHERE, draws};
+pub(crate) use self::draw::{outline, raster};
 use self::surfaces::Surfaces;
 use super::constants::Values;
 use super::device::Gpu;

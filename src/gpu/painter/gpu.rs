@@ -10,6 +10,7 @@ use crate::model::terms::TermName;
 use crate::prepare::Baked;
 use crate::render::backdrop::Backdrop;
 use crate::render::image::Image;
+use crate::render::shade::PLAIN_LAYER;
 use crate::scene::Scene;
 use crate::scene::mesh::Mesh;
 use crate::scene::view::Camera;
@@ -50,13 +51,15 @@ impl GpuPainter {
         for &name in &self.terms {
             terms.push((name, self.renderer.render_term(name, camera, gain)?));
         }
-        Ok(self.with_background(terms, camera, gain))
+        let plain = self.renderer.render_plain(camera, gain)?;
+        Ok(self.with_background(terms, plain, camera, gain))
     }
 
-    /// Terms by their names, and what stands behind them.
+    /// Terms by their names, what is not skin, and what stands behind them.
     fn with_background(
         &self,
         terms: Vec<(TermName, Image)>,
+        plain: Option<Image>,
         camera: &Camera,
         gain: Gain,
     ) -> Vec<(String, Image)> {
@@ -64,10 +67,15 @@ impl GpuPainter {
         let background = scene.views[0].background;
         let behind = terms.last().and_then(|(_, image)| {
             let backdrop = Backdrop::new(scene, &self.params, background, camera, n)?;
-            Some((BACKGROUND.to_owned(), backdrop.layer(image, gain)))
+            let mut covered = image.clone();
+            for (covered, part) in covered.alpha.iter_mut().zip(plain.iter().flat_map(|plain| &plain.alpha)) {
+                *covered += part;
+            }
+            Some((BACKGROUND.to_owned(), backdrop.layer(&covered, gain)))
         });
         let named = terms.into_iter().map(|(name, image)| (name.name().to_owned(), image));
-        named.chain(behind).collect()
+        let plain = plain.map(|image| (PLAIN_LAYER.to_owned(), image));
+        named.chain(plain).chain(behind).collect()
     }
 
     /// What of a frame was cut; of texels once.
@@ -119,7 +127,11 @@ impl Painter for GpuPainter {
                     layers.push((name, self.renderer.render_term_async(name, camera, gain).await?));
                 }
             }
-            let layers = self.with_background(layers, camera, gain);
+            let plain = match beside.layers {
+                true => self.renderer.render_plain_async(camera, gain).await?,
+                false => None,
+            };
+            let layers = self.with_background(layers, plain, camera, gain);
             let haze = match beside.haze {
                 true => self.renderer.render_haze_async(camera, gain).await?,
                 false => Vec::new(),

@@ -2,19 +2,18 @@
 
 use wgpu::CommandEncoderDescriptor;
 
-use super::Renderer;
+use super::{Drawer, Layer, Renderer};
 use crate::GpuError;
 use crate::atlas::ATLAS;
 use crate::constants::Values;
 use crate::model::gain::Gain;
-use crate::model::terms::TermName;
 use crate::readback::Copy;
 use crate::scene::view::Camera;
-use crate::stage::End;
+use crate::stage::{Drawn, End};
 use crate::timing::{PassTime, Timer};
 
 /// What was drawn and read back.
-pub(super) struct Drawn {
+pub(super) struct Read {
     /// The place of its targets.
     pub(super) stage: usize,
     pub(super) planes: Vec<Vec<f32>>,
@@ -51,20 +50,25 @@ impl Renderer {
         frames: usize,
         counts: fn(&str) -> bool,
     ) -> Result<Vec<f64>, GpuError> {
-        let program = self.program(None)?;
+        let program = self.program(Layer::Whole)?;
         let stage = self.stage(camera, program)?;
-        let Self { gpu, programs, stages, uploads, morph_weights, .. } = self;
-        let (program, stage, morph_weights) = (&programs[program], &stages[stage], morph_weights.as_slice());
+        let Self { gpu, programs, plain, stages, uploads, morph_weights, .. } = self;
+        let Drawer { program, plain: pipeline, .. } = &programs[program];
+        let (stage, morph_weights) = (&stages[stage], morph_weights.as_slice());
+        let plain = plain.as_ref().zip(pipeline.as_ref());
         let mut timers = Vec::with_capacity(frames);
         for _ in 0..frames {
             program.forget();
             for (i, &tile) in stage.targets.tiles.iter().enumerate() {
                 let mut timer = Timer::new(gpu);
                 let params = &uploads.content().params;
-                program.set(gpu, &Values { params, camera, tile, morph_weights });
+                let values = Values { params, camera, tile, morph_weights };
+                program.set(gpu, &values);
+                plain.iter().for_each(|(plain, _)| plain.set(gpu, &values));
                 let mut encoder = gpu.device.create_command_encoder(&CommandEncoderDescriptor::default());
                 uploads.draw_shadow_maps(gpu, &mut encoder, morph_weights, Some(&mut timer));
-                stage.encode_tile(gpu, &mut encoder, program, tile, i == 0, Some(&mut timer));
+                let drawn = Drawn { program, plain, uploads };
+                stage.encode_tile(gpu, &mut encoder, &drawn, tile, i == 0, Some(&mut timer));
                 timer.finish(&mut encoder);
                 gpu.queue.submit([encoder.finish()]);
                 if gpu.is_software() {
@@ -96,46 +100,51 @@ impl Renderer {
     /// As of [`Self::render`].
     pub fn draw_unread(&mut self, camera: &Camera, gain: impl Into<Gain>) -> Result<(), GpuError> {
         self.show_behind(camera);
-        self.submit(None, camera, gain.into(), End::Unread, None).map(drop)
+        self.submit(Layer::Whole, camera, gain.into(), End::Unread, None).map(drop)
     }
 
-    /// Draw the whole or a term, and read it.
+    /// Draw a layer, and read it.
     pub(super) fn draw(
         &mut self,
-        output: Option<TermName>,
+        layer: Layer,
         camera: &Camera,
         gain: Gain,
         end: End,
-    ) -> Result<Drawn, GpuError> {
+    ) -> Result<Read, GpuError> {
         let mut timer = self.options.timed.then(|| Timer::new(&self.gpu));
-        let (stage, copies) = self.submit(output, camera, gain, end, timer.as_mut())?;
+        let (stage, copies) = self.submit(layer, camera, gain, end, timer.as_mut())?;
         let planes = copies.iter().map(|copy| copy.read(&self.gpu)).collect::<Result<Vec<_>, _>>()?;
-        Ok(Drawn { stage, planes, times: timer.map(|timer| timer.times).unwrap_or_default() })
+        Ok(Read { stage, planes, times: timer.map(|timer| timer.times).unwrap_or_default() })
     }
 
     /// Have an image drawn: the place of the targets that it is drawn into, and copies of what it is made of. Waits
     /// only where it is timed.
     pub(super) fn submit(
         &mut self,
-        output: Option<TermName>,
+        layer: Layer,
         camera: &Camera,
         gain: Gain,
         end: End,
         mut timer: Option<&mut Timer>,
     ) -> Result<(usize, Vec<Copy>), GpuError> {
-        let program = self.program(output)?;
+        let program = self.program(layer)?;
         let place = self.stage(camera, program)?;
-        let Self { gpu, programs, stages, uploads, morph_weights, .. } = self;
-        let (program, stage, morph_weights) = (&programs[program], &stages[place], morph_weights.as_slice());
+        let Self { gpu, programs, plain, stages, uploads, morph_weights, .. } = self;
+        let Drawer { program, plain: pipeline, .. } = &programs[program];
+        let (stage, morph_weights) = (&stages[place], morph_weights.as_slice());
+        let plain = plain.as_ref().zip(pipeline.as_ref());
         let mut copies = Vec::new();
         let tiles = &stage.targets.tiles;
         for (i, &tile) in tiles.iter().enumerate() {
             let params = &uploads.content().params;
-            program.set(gpu, &Values { params, camera, tile, morph_weights });
+            let values = Values { params, camera, tile, morph_weights };
+            program.set(gpu, &values);
+            plain.iter().for_each(|(plain, _)| plain.set(gpu, &values));
             let mut encoder =
                 gpu.device.create_command_encoder(&CommandEncoderDescriptor { label: Some("frame") });
             uploads.draw_shadow_maps(gpu, &mut encoder, morph_weights, timer.as_deref_mut());
-            stage.encode_tile(gpu, &mut encoder, program, tile, i == 0, timer.as_deref_mut());
+            let drawn = Drawn { program, plain, uploads };
+            stage.encode_tile(gpu, &mut encoder, &drawn, tile, i == 0, timer.as_deref_mut());
             if i + 1 == tiles.len() {
                 copies = stage.encode_end(gpu, &mut encoder, gain, end, timer.as_deref_mut());
             }

@@ -1,15 +1,15 @@
 //! What a renderer makes when it is first asked for: programs and targets.
 
-use super::{Renderer, hazy};
+use super::{Drawer, Layer, Renderer};
 use crate::GpuError;
 use crate::bloom::Finish;
+use crate::geometry::outline;
 use crate::model::effects::Effect;
-use crate::model::terms::TermName;
 use crate::program::{Program, Shaded};
 use crate::render::shading::Shading;
 use crate::resolve::Resolve;
 use crate::scene::view::Camera;
-use crate::shader::{Budget, Facts, Plan, plan};
+use crate::shader::{Budget, Facts, Plan, PlanError, plan};
 use crate::stage::Stage;
 use crate::targets::{Key, Precision, Targets};
 use crate::visibility_buffer::fits;
@@ -18,26 +18,36 @@ use crate::visibility_buffer::fits;
 const HALF_ERROR: f64 = 1e-3;
 
 impl Renderer {
-    /// The place of the program that draws the whole, or a term; made if it is not there yet.
-    pub(super) fn program(&mut self, output: Option<TermName>) -> Result<usize, GpuError> {
-        if let Some(i) = self.programs.iter().position(|program| program.plan().facts.output == output) {
+    /// The place of what draws a layer; made if it is not there yet.
+    pub(super) fn program(&mut self, layer: Layer) -> Result<usize, GpuError> {
+        if let Some(i) = self.programs.iter().position(|drawer| drawer.layer == layer) {
             return Ok(i);
         }
-        let plan =
-            plan(&Facts { output, ..self.facts }).map_err(|error| GpuError::Plan(error.to_string()))?;
-        let program = self.compiled(plan)?;
-        self.programs.push(program);
+        let planned = match layer {
+            Layer::Whole => plan(&Facts { output: None, ..self.facts }),
+            Layer::Term(term) => plan(&Facts { output: Some(term), ..self.facts }),
+            Layer::Plain => hidden(&self.facts),
+        };
+        let planned = planned.map_err(|error| GpuError::Plan(error.to_string()))?;
+        let program = self.compiled(layer, planned)?;
+        let key = self.key(1, 1, layer.is_hazy(program.plan()), program.is_computed());
+        let plain = self.plain.as_ref().map(|plain| plain.pipeline(&self.gpu, &key, layer.shows_plain()));
+        self.gpu.check()?;
+        self.programs.push(Drawer { layer, program, plain });
         Ok(self.programs.len() - 1)
     }
 
-    /// A plan on the device, where it is to be evaluated and can be.
-    pub(super) fn compiled(&mut self, plan: Plan) -> Result<Program<Shaded>, GpuError> {
-        let wanted =
-            self.options.shading == Shading::VisibilityBuffer && self.options.antialias.multisamples() == 1;
-        let format = self.key(1, 1, hazy(&plan), true).precision.wgsl();
+    /// A plan on the device, where it is to be evaluated and can be. Beside what is not skin the rasteriser's stages
+    /// shade: one depth for both.
+    pub(super) fn compiled(&mut self, layer: Layer, plan: Plan) -> Result<Program<Shaded>, GpuError> {
+        let wanted = self.options.shading == Shading::VisibilityBuffer
+            && self.options.antialias.multisamples() == 1
+            && self.plain.is_none();
+        let hazy = layer.is_hazy(&plan);
+        let format = self.key(1, 1, hazy, true).precision.wgsl();
         let modules = wanted.then(|| plan.visibility_buffer(format)).flatten();
         let modules = modules.filter(|modules| fits(&self.gpu, &plan, modules, &self.uploads));
-        let key = self.key(1, 1, hazy(&plan), modules.is_some());
+        let key = self.key(1, 1, hazy, modules.is_some());
         Program::shaded(&self.gpu, plan, modules.as_ref(), &mut self.uploads, &key)
     }
 
@@ -57,8 +67,9 @@ impl Renderer {
 
     /// The place of the targets for such images; those of another size give way to them.
     pub(super) fn stage(&mut self, camera: &Camera, program: usize) -> Result<usize, GpuError> {
-        let program = &self.programs[program];
-        let key = self.key(camera.width, camera.height, hazy(program.plan()), program.is_computed());
+        let Drawer { layer, program, .. } = &self.programs[program];
+        let hazy = layer.is_hazy(program.plan());
+        let key = self.key(camera.width, camera.height, hazy, program.is_computed());
         self.stages
             .retain(|stage| (stage.targets.key.width, stage.targets.key.height) == (key.width, key.height));
         if let Some(i) = self.stages.iter().position(|stage| stage.targets.key == key) {
@@ -73,4 +84,11 @@ impl Renderer {
         self.stages.push(Stage { targets, resolve, finish });
         Ok(self.stages.len() - 1)
     }
+}
+
+/// Skin that hides what is behind it and shows as nothing.
+fn hidden(facts: &Facts) -> Result<Plan, PlanError> {
+    let plan = outline(facts)?;
+    let nothing = "\n@fragment\nfn fs_main() -> @location(0) vec4f {\n    return vec4f(0.0);\n}\n";
+    Ok(Plan { wgsl: plan.wgsl + nothing, ..plan })
 }

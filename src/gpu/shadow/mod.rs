@@ -41,7 +41,7 @@ pub(super) struct Maps {
     pipeline: RenderPipeline,
     constants: Vec<Constant>,
     attributes: Vec<Buffer>,
-    /// The mesh's triangles, and how many indices they have.
+    /// The triangles that stand in light's way, and how many indices they have.
     indices: (Buffer, u32),
     /// Whether they do not show the present pose.
     stale: bool,
@@ -87,8 +87,7 @@ impl Maps {
         let layers = (0..count).map(layer).collect();
         let rows = gpu.buffer("shadow views", &vec![0; 16 * ROWS * count.max(1)], BufferUsages::STORAGE);
         gpu.check()?;
-        let triangles = uploads.content().scene.mesh.triangles.len();
-        let indices = (uploads.indices().clone(), 3 * triangles as u32);
+        let indices = (uploads.indices().clone(), 3 * uploads.triangles().blocking);
         let constants = plan.constants;
         let (stale, drawn) = (true, 0);
         Ok(Self {

@@ -176,7 +176,8 @@ impl<'a> Drawn<'a> {
         evaluated: &Evaluated,
         maps: ShadowMaps,
     ) -> Result<Self, StudyError> {
-        GpuError::check_drawn(&evaluated.scene)?;
+        // Of what is not skin shadow maps move nothing that is compared.
+        GpuError::check_sampled(&evaluated.scene)?;
         let mut scene = evaluated.scene.clone();
         scene.shadow_maps = maps;
         // The processor's images here are without it.

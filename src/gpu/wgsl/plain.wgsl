@@ -1,0 +1,246 @@
+// What is not skin, by its glTF material (metallic-roughness) under the scene's light, after what places the mesh. The
+// CPU's samples trace rays (`samples::plain`); fragments look along the same directions and ask harmonics of their
+// vertices what stands in the way (`samples::plain_vertices`).
+
+// Samples along a pixel's side, or those of a pixel that the hardware keeps.
+override axis: u32 = 1u;
+override multisamples: u32 = 1u;
+// Directions of each of the two kinds that are looked along.
+const DIRECTIONS = 32u;
+const PI = 3.14159265358979;
+const DIELECTRIC_F0 = 0.04;
+const LEAST_ALPHA = 1e-3;
+const LEAST_FACING = 1e-4;
+
+struct Light {
+    // The unit vector towards parallel light, or with w = 1 the place of a lamp.
+    from: vec4f,
+    strength: vec4f,
+}
+
+struct Material {
+    base_color: vec4f,
+    // The last: below this alpha there is a hole.
+    emission: vec4f,
+    // Metal and roughness; then 0 where alpha does nothing, 1 where it cuts holes, 2 where it is the share that is seen.
+    factors: vec4f,
+}
+
+@group(1) @binding(0) var<storage, read> rows: array<vec4f>;
+@group(1) @binding(1) var<storage, read> lights: array<Light>;
+// Each level is the mean of the one before. Without an environment a level of black.
+@group(1) @binding(2) var sky: texture_cube<f32>;
+@group(1) @binding(3) var sky_sampler: sampler;
+@group(2) @binding(0) var<uniform> material: Material;
+@group(2) @binding(1) var color_map: texture_2d<f32>;
+@group(2) @binding(2) var color_sampler: sampler;
+@group(2) @binding(3) var roughness_map: texture_2d<f32>;
+@group(2) @binding(4) var roughness_sampler: sampler;
+@group(2) @binding(5) var emission_map: texture_2d<f32>;
+@group(2) @binding(6) var emission_sampler: sampler;
+
+struct Surface {
+    diffuse: vec3f,
+    f0: vec3f,
+    alpha: f32,
+    emission: vec3f,
+}
+
+// What is seen from where: unit vectors, and the cosine between them.
+struct Seen {
+    normal: vec3f,
+    view: vec3f,
+    facing: f32,
+}
+
+fn unit_or_zero(v: vec3f) -> vec3f {
+    let largest = max(max(abs(v.x), abs(v.y)), abs(v.z));
+    if (!(largest > 1e-37 && largest < 1e37)) {
+        return vec3f(0.0);
+    }
+    return normalize(v / largest);
+}
+
+fn base_color(at: PlainVaryings) -> vec4f {
+    return material.base_color * textureSampleLevel(color_map, color_sampler, at.uv, 0.0) * at.tint;
+}
+
+fn surface(at: PlainVaryings) -> Surface {
+    let base = clamp(base_color(at).rgb, vec3f(0.0), vec3f(1.0));
+    let read = textureSampleLevel(roughness_map, roughness_sampler, at.uv, 0.0);
+    let metal = clamp(material.factors.x * read.b, 0.0, 1.0);
+    let roughness = clamp(material.factors.y * read.g, 0.0, 1.0);
+    let glow = material.emission.rgb * textureSampleLevel(emission_map, emission_sampler, at.uv, 0.0).rgb;
+    return Surface(
+        base * (1.0 - metal),
+        mix(vec3f(DIELECTRIC_F0), base, metal),
+        max(roughness * roughness, LEAST_ALPHA),
+        max(glow, vec3f(0.0)),
+    );
+}
+
+fn schlick(v_h: f32) -> f32 {
+    let c = 1.0 - clamp(v_h, 0.0, 1.0);
+    return c * c * c * c * c;
+}
+
+fn fresnel(s: Surface, v_h: f32) -> vec3f {
+    return s.f0 + (1.0 - s.f0) * schlick(v_h);
+}
+
+fn diffuse_towards(s: Surface, v_h: f32) -> vec3f {
+    return s.diffuse * ((1.0 - DIELECTRIC_F0) * (1.0 - schlick(v_h)));
+}
+
+// GGX's distribution, from the squared sine and cosine of (N, H).
+fn distribution(sine_squared: f32, cosine_squared: f32, alpha: f32) -> f32 {
+    let a2 = alpha * alpha;
+    let spread = a2 * cosine_squared + sine_squared;
+    return a2 / (PI * spread * spread);
+}
+
+// Smith's height-correlated masking over 4 (N.L)(N.V).
+fn masking(n_l: f32, n_v: f32, alpha: f32) -> f32 {
+    let a2 = alpha * alpha;
+    return 0.5 / (n_v * sqrt(a2 + (1.0 - a2) * n_l * n_l) + n_l * sqrt(a2 + (1.0 - a2) * n_v * n_v));
+}
+
+// The share of the light along d that nothing stands in the way of: 1 less harmonics of three bands.
+fn open_along(at: PlainVaryings, d: vec3f) -> f32 {
+    let second = vec4f(d.x * d.z, d.x * d.y, 1.5 * d.y * d.y - 0.5, d.y * d.z) * vec4f(1.0925484306, 1.0925484306, 0.6307831305, 1.0925484306);
+    let blocked = dot(at.blocked_first, vec4f(0.2820947918, 0.4886025119 * d.x, 0.4886025119 * d.y, 0.4886025119 * d.z))
+        + dot(at.blocked_second, second)
+        + at.blocked_last * 0.5462742153 * (d.z * d.z - d.x * d.x);
+    return clamp(1.0 - blocked, 0.0, 1.0);
+}
+
+// The mean radiance about d over a solid angle.
+fn sky_along(d: vec3f, solid_angle: f32) -> vec3f {
+    let held = clamp(solid_angle, 1e-6, 4.0 * PI);
+    let texels = sqrt(4.0 * PI / (6.0 * held));
+    let level = log2(f32(textureDimensions(sky).x) / texels);
+    return textureSampleLevel(sky, sky_sampler, d, max(level, 0.0)).rgb;
+}
+
+// A frame with Z along n (Duff et al., Building an Orthonormal Basis, Revisited, JCGT 2017).
+fn frame_about(n: vec3f) -> mat3x3f {
+    let side = select(-1.0, 1.0, n.z >= 0.0);
+    let a = -1.0 / (side + n.z);
+    let b = n.x * n.y * a;
+    return mat3x3f(
+        vec3f(1.0 + side * n.x * n.x * a, side * b, -side * n.x),
+        vec3f(b, side + n.y * n.y * a, -n.y),
+        n,
+    );
+}
+
+// Reflected light of the environment: filtered importance sampling (Krivanek and Colbert 2008), by the cosine and by
+// GGX's distribution of half vectors, over Hammersley's points.
+fn of_sky(at: PlainVaryings, s: Surface, seen: Seen) -> vec3f {
+    let frame = frame_about(seen.normal);
+    let each = f32(DIRECTIONS);
+    var sum = vec3f(0.0);
+    for (var i = 0u; i < DIRECTIONS; i++) {
+        let u = (f32(i) + 0.5) / each;
+        let turn = 2.0 * PI * f32(reverseBits(i)) / 4294967296.0;
+        let around = vec2f(cos(turn), sin(turn));
+        let up = sqrt(1.0 - u);
+        let toward = frame * vec3f(sqrt(u) * around, up);
+        let v_h = dot(seen.view, unit_or_zero(toward + seen.view));
+        let light = open_along(at, toward) * sky_along(toward, PI / (each * max(up, 1e-3)));
+        sum += diffuse_towards(s, v_h) / each * light;
+
+        // tan^2 of the half vector's angle.
+        let tangent = s.alpha * s.alpha * u / (1.0 - u);
+        let cosine = inverseSqrt(1.0 + tangent);
+        let half_way = frame * vec3f(sqrt(tangent) * cosine * around, cosine);
+        let v_half = dot(seen.view, half_way);
+        let mirrored = 2.0 * v_half * half_way - seen.view;
+        let n_l = dot(seen.normal, mirrored);
+        if (n_l > 0.0 && v_half > 0.0) {
+            let density = distribution(tangent * cosine * cosine, cosine * cosine, s.alpha) * cosine / (4.0 * v_half);
+            let masked = masking(n_l, seen.facing, s.alpha) * 4.0 * n_l * seen.facing;
+            let weight = masked * v_half / (seen.facing * cosine * each);
+            let bright = open_along(at, mirrored) * sky_along(mirrored, 1.0 / (each * density));
+            sum += weight * fresnel(s, v_half) * bright;
+        }
+    }
+    return sum;
+}
+
+// Reflected light of one light, of whose strength so much arrives.
+fn of_light(at: PlainVaryings, light: Light, arriving: f32, s: Surface, seen: Seen) -> vec3f {
+    let toward = select(light.from.xyz, unit_or_zero(light.from.xyz - at.place), light.from.w > 0.5);
+    let n_l = dot(seen.normal, toward);
+    if (!(n_l > 0.0)) {
+        return vec3f(0.0);
+    }
+    let half_way = unit_or_zero(toward + seen.view);
+    let across = cross(seen.normal, half_way);
+    let n_h = dot(seen.normal, half_way);
+    let v_h = max(dot(seen.view, half_way), 0.0);
+    let lobe = distribution(dot(across, across), n_h * n_h, s.alpha) * masking(n_l, seen.facing, s.alpha);
+    return (diffuse_towards(s, v_h) / PI + fresnel(s, v_h) * lobe) * light.strength.rgb * (arriving * n_l);
+}
+
+// The radiance that leaves towards the eye; `plane` is a normal of the triangle, of any length and sign. Both sides are
+// drawn, each as the front.
+fn radiance(at: PlainVaryings, plane: vec3f) -> vec3f {
+    let s = surface(at);
+    let view = unit_or_zero(constants.eye.xyz - at.place);
+    var normal = unit_or_zero(at.normal);
+    if (all(normal == vec3f(0.0)) || all(view == vec3f(0.0))) {
+        return s.emission;
+    }
+    // Near the silhouette of a coarse mesh the smooth normal may face away where the triangle does not.
+    if (dot(plane, normal) * dot(plane, view) < 0.0) {
+        normal = -normal;
+    }
+    let cosine = dot(normal, view);
+    if (cosine < LEAST_FACING) {
+        normal = unit_or_zero(normal + (LEAST_FACING - cosine) * view);
+    }
+    let seen = Seen(normal, view, max(dot(normal, view), LEAST_FACING));
+    var sum = s.emission + of_sky(at, s, seen);
+    let arriving = arriving_of(at);
+    for (var i = 0u; i < LIGHTS; i++) {
+        sum += of_light(at, lights[i], arriving[i / 4u][i % 4u], s, seen);
+    }
+    return select(vec3f(0.0), max(sum, vec3f(0.0)), abs(sum) < vec3f(3.0e38));
+}
+
+fn hashed(x: u32) -> u32 {
+    var h = (x ^ (x >> 16u)) * 0x85ebca6bu;
+    h = (h ^ (h >> 13u)) * 0xc2b2ae35u;
+    return h ^ (h >> 16u);
+}
+
+// Above this alpha the kth of a pixel's samples shows the layer: even over the pixel's, turned by triangle, so that the
+// mean over them is blended in any order (Enderton et al. 2010, Stochastic Transparency, stratified).
+fn threshold(k: u32, count: u32, pixel: vec2u, triangle: u32) -> f32 {
+    let turn = f32(hashed(pixel.x ^ hashed(pixel.y ^ hashed(triangle))) >> 8u) / 16777216.0;
+    return fract((f32((11u * k) % count) + 0.5) / f32(count) + turn);
+}
+
+// Which of the samples that the hardware keeps of a fragment show it; one, where it keeps one.
+fn samples_shown(at: PlainVaryings) -> u32 {
+    let all = (1u << multisamples) - 1u;
+    if (material.factors.z < 0.5) {
+        return all;
+    }
+    let alpha = clamp(base_color(at).a, 0.0, 1.0);
+    if (material.factors.z < 1.5) {
+        return select(0u, all, alpha >= material.emission.a);
+    }
+    let fragment = vec2u(at.clip.xy);
+    let pixel = fragment / axis;
+    let place = (fragment.x % axis) + axis * (fragment.y % axis);
+    let count = axis * axis * multisamples;
+    var mask = 0u;
+    for (var k = 0u; k < multisamples; k++) {
+        if (alpha > threshold(place * multisamples + k, count, pixel, at.first)) {
+            mask |= 1u << k;
+        }
+    }
+    return mask;
+}

@@ -1,0 +1,167 @@
+//! Parts that are not skin as the renderer draws them, beside the CPU's rays.
+
+use serde_json::{Value, json};
+use skinfit::gpu::{Gpu, RenderOptions, Renderer};
+use skinfit::model::params::Param;
+use skinfit::model::terms::TermName;
+use skinfit::prepare::{Baked, PrepareOptions};
+use skinfit::render::antialias::Antialias;
+use skinfit::render::image::Image;
+use skinfit::render::shading::Shading;
+
+use super::{SCENE, close, edited, folder};
+use crate::common;
+use crate::graphics::bench::{Content, EXACT, cache, gpu, on_cpu, on_gpu};
+use crate::scene_folder::SceneFolder;
+
+fn baked(folder: &SceneFolder) -> Baked {
+    Baked::new(&folder.path("scene.toml"), &PrepareOptions::default()).unwrap()
+}
+
+fn both(gpu: &Gpu, folder: &SceneFolder) -> [Image; 2] {
+    let baked = baked(folder);
+    [on_cpu(&baked, 2), on_gpu(gpu, &baked, EXACT)]
+}
+
+/// The middle of both engines' images of a scene whose eye has this material.
+fn middles(gpu: &Gpu, material: &Value, scene: &str) -> [[f32; 3]; 2] {
+    both(gpu, &folder(material, scene)).map(|image| image.rgb[8 * 16 + 8])
+}
+
+#[test]
+fn materials_under_a_sky_of_one_and_a_lamp_are_those_of_rays() {
+    let Some(gpu) = gpu() else { return };
+    let lamp = "[[light]]\nname = \"plain_key\"\ntype = \"directional\"\ndirection = [0.3, -0.2, -1]\nirradiance = [3.0, 2.0, 1.0]\n";
+    let lit = SCENE.replace("\"diffuse\"", "\"diffuse\", \"lights\", \"shadows\"") + lamp;
+    let materials = [
+        json!({"metallicFactor": 1, "roughnessFactor": 0, "baseColorFactor": [0.9, 0.5, 0.2, 1]}),
+        json!({"metallicFactor": 0, "roughnessFactor": 0.5, "baseColorFactor": [0, 0, 0, 1]}),
+        json!({"metallicFactor": 0, "roughnessFactor": 1, "baseColorFactor": [0.8, 0.6, 0.4, 1]}),
+        json!({"metallicFactor": 0.5, "roughnessFactor": 0.7, "baseColorTexture": {"index": 0}}),
+    ];
+    for material in materials {
+        let eye = json!({"name": "Eye", "emissiveFactor": [0.25, 0, 0], "pbrMetallicRoughness": material});
+        for scene in [SCENE, &lit] {
+            let [rays, drawn] = middles(gpu, &eye, scene);
+            // Nothing is in the way of the sky of one: what is left are Hammersley's points beside Sobol's, 32 of a lobe.
+            assert!(close(drawn, rays, 4e-3), "{material}: {drawn:?} is not {rays:?}");
+        }
+    }
+}
+
+#[test]
+fn alpha_cuts_holes_or_blends_and_every_layer_adds_up() {
+    let Some(gpu) = gpu() else { return };
+    let of = |mode: &str, alpha: f64| json!({"name": "Eye", "alphaMode": mode, "pbrMetallicRoughness": {"metallicFactor": 1, "roughnessFactor": 0, "baseColorFactor": [0, 0, 0, alpha]}});
+    for (mode, alpha, want) in
+        [("OPAQUE", 0.2, 0.0), ("MASK", 0.6, 0.0), ("MASK", 0.4, 1.0), ("BLEND", 0.5, 0.5)]
+    {
+        let [rays, drawn] = middles(gpu, &of(mode, alpha), SCENE);
+        // Of four samples a pixel half see the skin, exactly.
+        assert!(close(drawn, [want; 3], 1e-3) && close(rays, [want; 3], 1e-3), "{mode}: {drawn:?}, {rays:?}");
+    }
+    // Of what the hardware keeps of a pixel, too.
+    let multisampled = RenderOptions { antialias: Antialias::Msaa4, ..EXACT };
+    let image = on_gpu(gpu, &baked(&folder(&of("BLEND", 0.5), SCENE)), multisampled);
+    assert!(close(image.rgb[8 * 16 + 8], [0.5; 3], 2e-3), "{:?}", image.rgb[8 * 16 + 8]);
+    // Layers of a picture are its whole: the skin's terms, and what is before it.
+    let eye = json!({"name": "Eye", "alphaMode": "BLEND", "pbrMetallicRoughness": {
+        "metallicFactor": 0, "roughnessFactor": 0.6, "baseColorFactor": [0.9, 0.4, 0.1, 0.7]}});
+    let scene = SCENE.replace("\"diffuse\"", "\"diffuse\", \"hilite\", \"haze\"");
+    for scene in [SCENE, &scene] {
+        let baked = baked(&folder(&eye, scene));
+        let camera = baked.scene.views[0].camera;
+        let mut renderer = Renderer::new(gpu, Content::of(&baked), EXACT).unwrap();
+        let whole = renderer.render(&camera, 0.5).unwrap().image;
+        let plain = renderer.render_plain(&camera, 0.5).unwrap().unwrap();
+        let terms = TermName::of(baked.scene.effects);
+        let terms: Vec<Image> =
+            terms.into_iter().map(|term| renderer.render_term(term, &camera, 0.5).unwrap()).collect();
+        for i in 0..256 {
+            let sum: [f32; 3] =
+                std::array::from_fn(|c| terms.iter().chain([&plain]).map(|layer| layer.rgb[i][c]).sum());
+            // Each layer is its own shader: a few roundings of f32.
+            assert!(close(sum, whole.rgb[i], 1e-5), "pixel {i}: {sum:?} is not {:?}", whole.rgb[i]);
+            assert!((terms[0].alpha[i] + plain.alpha[i] - whole.alpha[i]).abs() < 1e-6, "pixel {i}");
+        }
+        assert!(plain.alpha[8 * 16 + 8] > 0.4 && terms[0].alpha[8 * 16 + 8] > 0.2);
+    }
+}
+
+#[test]
+fn holes_and_veils_cast_no_shadow_in_shadow_maps() {
+    let Some(gpu) = gpu() else { return };
+    let lamp = "[[light]]\nname = \"plain_aside\"\ntype = \"directional\"\ndirection = [1, 0, -0.7]\nirradiance = [3.0, 3.0, 3.0]\n";
+    let lit = SCENE
+        .replace("\"diffuse\"", "\"lights\", \"shadows\"")
+        .replace("[environment]\nfile = \"env.exr\"\n", lamp);
+    for (mode, shaded) in [("OPAQUE", true), ("BLEND", false)] {
+        let eye = json!({"name": "Eye", "alphaMode": mode});
+        let image = on_gpu(gpu, &baked(&folder(&eye, &lit)), EXACT);
+        let row: Vec<f32> = (0..16).map(|x| image.rgb[8 * 16 + x][0]).collect();
+        assert!(row[2] > 0.1 && (row[13] < 1e-6) == shaded, "{mode}: {row:?}");
+    }
+}
+
+#[test]
+fn what_moves_is_lit_where_it_stands_and_a_turned_sky_turns_on_it() {
+    let Some(gpu) = gpu() else { return };
+    // Red from the right, green from the left.
+    let two = |edit: &dyn Fn(&mut Value, &mut Vec<u8>)| {
+        let eye = json!({"name": "Eye", "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 1}});
+        edited(&eye, &SCENE.replace("\"diffuse\"", "\"diffuse\", \"environment_rotation\""), |mesh, bin| {
+            mesh["nodes"][1]["rotation"] = json!([0.0, 0.382_683, 0.0, 0.923_880]);
+            edit(mesh, bin);
+        })
+    };
+    let folder = two(&|_, _| {});
+    folder.write(
+        "env.exr",
+        &crate::scene_folder::exr(8, 4, &["R", "G", "B"], |c, i| {
+            f32::from(u8::from((i % 8 < 4) == (c == 0)))
+        }),
+    );
+    let baked = baked(&folder);
+    let camera = baked.scene.views[0].camera;
+    let options = RenderOptions { shading: Shading::Forward, animated: true, ..EXACT };
+    let mut renderer = Renderer::new(gpu, Content::of(&baked), options).unwrap();
+    let before = renderer.render(&camera, 1.0).unwrap().image.rgb[8 * 16 + 8];
+    let mut params = baked.scene.params.clone();
+    params.set(Param::EnvironmentRotation, 180.0);
+    renderer.set_params(&params).unwrap();
+    let turned = renderer.render(&camera, 1.0).unwrap().image.rgb[8 * 16 + 8];
+    // Half a turn exchanges the colours.
+    assert!((before[0] - before[1]).abs() > 0.1, "{before:?}");
+    assert!(close([turned[1], turned[0], turned[2]], before, 1e-2), "{before:?} {turned:?}");
+    // Drawn in the pose that it has already, nothing changes.
+    renderer.set_mesh(&baked.scene.mesh, None).unwrap();
+    assert_eq!(renderer.render(&camera, 1.0).unwrap().image.rgb[8 * 16 + 8], turned);
+}
+
+#[test]
+fn the_eyes_of_a_path_traced_head_look_as_by_rays() {
+    let Some(gpu) = gpu() else { return };
+    let Some(data) = common::data() else { return };
+    let options = PrepareOptions { cache: Some(cache()), ..PrepareOptions::default() };
+    let baked = Baked::new(&data.join("mh_portrait/scene.toml"), &options).unwrap();
+    let view = &baked.scene.views[0];
+    let sampled = baked.clone().sample().unwrap();
+    let mut renderer = Renderer::new(gpu, Content::of(&baked), EXACT).unwrap();
+    let drawn = renderer.render_plain(&view.camera, 1.0).unwrap().unwrap();
+    let (mut misfit, mut energy, mut coverage) = (0.0_f64, 0.0_f64, [0.0_f64; 2]);
+    for part in &sampled.samples[0].plain {
+        let at = part.pixel as usize;
+        coverage[0] += f64::from(part.share);
+        coverage[1] += f64::from(drawn.alpha[at]);
+        for (got, want) in drawn.rgb[at].iter().zip(part.rgb) {
+            misfit += f64::from(got - want).powi(2);
+            energy += f64::from(want).powi(2);
+        }
+    }
+    // What is before the eyes in the sky is known by nine numbers a vertex, and of a sample by 32 rays a lobe.
+    let error = (misfit / energy).sqrt();
+    println!("eyes: {:.1}% of their radiance; {coverage:?} pixels", 100.0 * error);
+    assert!(error < 0.2, "{error}");
+    // Samples lie where the rays go: a pixel of rounding.
+    assert!((coverage[0] - coverage[1]).abs() < 0.02 * coverage[0], "{coverage:?}");
+}
