@@ -183,7 +183,11 @@ fn check(gpu: &Gpu, size: u32, uploads: &Uploads) -> Result<(), GpuError> {
         let of = Oversized::Map;
         return Err(GpuError::TextureSize { adapter, what, width: side, height: side, limit, of });
     }
-    match tile_outside_atlas(&uploads.content().scene.mesh.uvs) {
+    // What is not skin has texture coordinates for its own pictures.
+    let uvs = &uploads.content().scene.mesh.uvs;
+    let skin = uploads.triangles().of_skin().as_flattened();
+    let uvs: Vec<_> = skin.iter().filter_map(|&vertex| uvs.get(vertex as usize).copied()).collect();
+    match tile_outside_atlas(&uvs) {
         Some([u, v]) => Err(GpuError::OutsideAtlas { u, v }),
         None => Ok(()),
     }

@@ -99,10 +99,10 @@ pub enum GpuError {
         /// The adapter.
         adapter: String,
     },
-    /// The scene has what adapters do not draw.
-    #[error("{what}, which adapters do not take.")]
+    /// The scene has what adapters do not take.
+    #[error("{what}.")]
     CpuAlone {
-        /// That it has it.
+        /// That it has it, and what they do not do with it.
         what: String,
     },
     /// Samples that the adapter makes do not all stay on it.

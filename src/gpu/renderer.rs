@@ -222,7 +222,8 @@ impl Renderer {
     }
 
     /// Move the bones of the scene's own mesh, and the weights of its targets: all that a clip changes of most meshes, and
-    /// far less to write than [`set_mesh`](Self::set_mesh) does. Bones and targets that are not given stand as in the scene;
+    /// far less to write than [`set_mesh`](Self::set_mesh) does, but where shadow maps, parts that are not skin or what rays
+    /// find of vertices go by the posed surface. Bones and targets that are not given stand as in the scene;
     /// occlusion is the scene's. Only with [`RenderOptions::animated`].
     ///
     /// # Errors
@@ -260,7 +261,10 @@ impl Renderer {
         let before = &self.uploads.content().params;
         let turned = before.scalar(Param::EnvironmentRotation);
         // What is not skin is lit when it is made.
-        let lit = self.plain.is_none() || params.differ_in_weights_alone(before);
+        let scene = &self.uploads.content().scene;
+        let turns = params.scalar(Param::EnvironmentRotation) != turned;
+        let moves = turns || scene.lights_at(params) != scene.lights_at(before);
+        let lit = self.plain.is_none() || !moves;
         if lit && self.facts.at(params) == self.facts && self.uploads.set_params(params) {
             self.forget();
         } else {
@@ -270,7 +274,7 @@ impl Renderer {
             *self = Self::new(&self.gpu, content, self.options)?;
             self.background = background;
         }
-        if params.scalar(Param::EnvironmentRotation) != turned {
+        if turns {
             self.backdrop = None;
         }
         Ok(())

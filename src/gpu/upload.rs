@@ -208,11 +208,6 @@ impl Uploads {
         self.bytes += bytes;
     }
 
-    /// Count texels beside that were cut.
-    pub(super) const fn add_clipped(&mut self, texels: usize) {
-        self.clipped += texels;
-    }
-
     pub(super) const fn bytes(&self) -> u64 {
         self.bytes
     }
@@ -460,7 +455,12 @@ fn check_size(gpu: &Gpu, what: &str, bytes: u64, limit: u64) -> Result<(), GpuEr
     Err(GpuError::BufferSize { adapter, what, bytes, limit, of: Oversized::Mesh })
 }
 
-fn buffer(gpu: &Gpu, label: &str, contents: &[u8], usage: BufferUsages) -> Result<Buffer, GpuError> {
+pub(super) fn buffer(
+    gpu: &Gpu,
+    label: &str,
+    contents: &[u8],
+    usage: BufferUsages,
+) -> Result<Buffer, GpuError> {
     check_size(gpu, label, contents.len() as u64, gpu.device.limits().max_buffer_size)?;
     let made = gpu.buffer(label, contents, usage);
     gpu.check()?;

@@ -46,7 +46,7 @@ struct PlainLight<'a> {
     rays: &'a RayMesh,
     shadows: Shadows<'a>,
     sky: Option<LobeSky>,
-    lights: Vec<&'a Light>,
+    lights: Vec<Light>,
     spread: Sobol,
 }
 
@@ -130,12 +130,7 @@ impl PlainLight<'_> {
         let [a, b, c] = corners.map(|i| posed.mesh.positions[i].as_dvec3());
         let plane = (b - a).cross(c - a);
         let seen_from_behind = plane.dot(normal) * plane.dot(view) < 0.0;
-        let (normal, place) = if seen_from_behind {
-            let origin = 2.0 * place.position.as_vec3a() - place.origin;
-            (-normal, Place { origin, ..place })
-        } else {
-            (normal, place)
-        };
+        let (normal, place) = if seen_from_behind { (-normal, place.other_side()) } else { (normal, place) };
         let normal = if normal == DVec3::ZERO { normal } else { facing(normal, view) };
         let tint =
             posed.mesh.plain.as_ref().map_or([1.0; 4], |plain| plain.tint(hit.triangle, hit.weights()));

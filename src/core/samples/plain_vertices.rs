@@ -34,11 +34,10 @@ pub struct PlainVertices {
     pub arriving: Vec<f32>,
 }
 
-/// The lights that shine on what is not skin.
+/// The lights that shine on what is not skin, where the scene's parameters have them stand.
 #[must_use]
-pub fn lights(scene: &Scene) -> Vec<&Light> {
-    let lit = scene.effects.has(Effect::Lights);
-    scene.lights.iter().chain(&scene.sky_lights).filter(|_| lit).collect()
+pub fn lights(scene: &Scene) -> Vec<Light> {
+    if scene.effects.has(Effect::Lights) { scene.lights_at(&scene.params) } else { Vec::new() }
 }
 
 impl PlainVertices {
@@ -49,7 +48,7 @@ impl PlainVertices {
         let places = places(mesh, &shadows);
         Self {
             blocked: blocked_of_each(mesh, rays, &places),
-            arriving: arriving(&lights(scene), &shadows, &places),
+            arriving: arriving(&lights(scene), &shadows, &places, &mesh.normals),
         }
     }
 }
@@ -97,23 +96,28 @@ fn blocked(rays: &RayMesh, spread: &Sobol, place: &Place, normal: Vec3A) -> [f32
     sums.map(|sum| (solid_angle * sum) as f32)
 }
 
-/// What arrives at the vertices of each light.
-fn arriving(lights: &[&Light], shadows: &Shadows<'_>, places: &[Option<Place>]) -> Vec<f32> {
+/// What arrives at the vertices of each light, on the side that faces it: as that is drawn.
+fn arriving(lights: &[Light], shadows: &Shadows<'_>, places: &[Option<Place>], normals: &[Vec3]) -> Vec<f32> {
     let mut arriving = vec![0.0; lights.len() * places.len()];
     if lights.is_empty() {
         return arriving;
     }
-    let blocks = arriving.par_chunks_mut(LANES * lights.len()).zip(places.par_chunks(LANES));
-    blocks.for_each(|(arriving, places)| {
-        let (which, known): (Vec<usize>, Vec<Place>) =
-            places.iter().enumerate().filter_map(|(k, place)| Some((k, (*place)?))).unzip();
+    let vertices = places.par_chunks(LANES).zip(normals.par_chunks(LANES));
+    let blocks = arriving.par_chunks_mut(LANES * lights.len()).zip(vertices);
+    blocks.for_each(|(arriving, (places, normals))| {
+        let known: Vec<(usize, Place)> =
+            places.iter().enumerate().filter_map(|(k, place)| Some((k, (*place)?))).collect();
         if known.is_empty() {
             return;
         }
-        let from = Places::new(&known);
         for (i, light) in lights.iter().enumerate() {
+            let lit = |&(k, place): &(usize, Place)| {
+                let behind = light.towards(place.position).dot(normals[k].as_dvec3()) < 0.0;
+                if behind { place.other_side() } else { place }
+            };
+            let from = Places::new(&known.iter().map(lit).collect::<Vec<_>>());
             let found = shadows.arriving(&from, light);
-            which.iter().zip(found).for_each(|(k, found)| arriving[k * lights.len() + i] = found);
+            known.iter().zip(found).for_each(|((k, _), found)| arriving[k * lights.len() + i] = found);
         }
     });
     arriving

@@ -30,6 +30,13 @@ pub struct Place {
     pub origin: Vec3A,
 }
 
+impl Place {
+    /// The same on the other side of the surface.
+    pub(super) fn other_side(self) -> Self {
+        Self { origin: 2.0 * self.position.as_vec3a() - self.origin, ..self }
+    }
+}
+
 /// A point of the unit disc: radius, which may be negative, then sine and cosine of the angle.
 type Disc = (f32, [f32; 2]);
 

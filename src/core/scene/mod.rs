@@ -150,14 +150,19 @@ impl Scene {
     pub fn cpu_alone(&self) -> Option<String> {
         // A rasteriser draws straight edges straight.
         let bent = self.views.iter().find(|view| view.camera.lens.distortion.is_some());
-        bent.map(|view| format!("view \"{}\" has a lens that bends what is straight", view.name))
+        bent.map(|view| {
+            format!(
+                "view \"{}\" has a lens that bends what is straight, which adapters do not draw",
+                view.name
+            )
+        })
     }
 
     /// Why the CPU alone makes samples of the scene, in words; `None` where adapters make them, too.
     #[must_use]
     pub fn cpu_samples(&self) -> Option<String> {
-        let parts = || self.mesh.plain.as_ref().map(|_| "the mesh has parts that are not skin".to_owned());
-        self.cpu_alone().or_else(parts)
+        let parts = "the mesh has parts that are not skin, of which adapters make no samples";
+        self.cpu_alone().or_else(|| self.mesh.plain.as_ref().map(|_| parts.to_owned()))
     }
 
     /// The switches of the model.

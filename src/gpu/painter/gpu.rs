@@ -45,13 +45,13 @@ impl GpuPainter {
         Ok(Self { gpu, renderer, scene, params, terms, times: Vec::new(), told: false })
     }
 
-    /// The layers of a frame: terms, and what stands behind the mesh.
+    /// The layers of a frame: terms, what is not skin, and what stands behind the mesh.
     fn layers(&mut self, camera: &Camera, gain: Gain) -> Result<Vec<(String, Image)>, GpuError> {
         let mut terms = Vec::new();
         for &name in &self.terms {
             terms.push((name, self.renderer.render_term(name, camera, gain)?));
         }
-        let plain = self.renderer.render_plain(camera, gain)?;
+        let plain = self.renderer.render_plain(camera, gain)?.filter(is_seen);
         Ok(self.with_background(terms, plain, camera, gain))
     }
 
@@ -65,14 +65,12 @@ impl GpuPainter {
     ) -> Vec<(String, Image)> {
         let (scene, n) = (&*self.scene, self.renderer.backdrop_samples());
         let background = scene.views[0].background;
-        let behind = terms.last().and_then(|(_, image)| {
-            let backdrop = Backdrop::new(scene, &self.params, background, camera, n)?;
-            let mut covered = image.clone();
-            for (covered, part) in covered.alpha.iter_mut().zip(plain.iter().flat_map(|plain| &plain.alpha)) {
-                *covered += part;
-            }
-            Some((BACKGROUND.to_owned(), backdrop.layer(&covered, gain)))
-        });
+        let mut covered = Image::new(camera.width as usize, camera.height as usize);
+        for layer in terms.last().map(|(_, image)| image).into_iter().chain(&plain) {
+            covered.alpha.iter_mut().zip(&layer.alpha).for_each(|(covered, part)| *covered += part);
+        }
+        let behind = Backdrop::new(scene, &self.params, background, camera, n)
+            .map(|backdrop| (BACKGROUND.to_owned(), backdrop.layer(&covered, gain)));
         let named = terms.into_iter().map(|(name, image)| (name.name().to_owned(), image));
         let plain = plain.map(|image| (PLAIN_LAYER.to_owned(), image));
         named.chain(plain).chain(behind).collect()
@@ -83,6 +81,11 @@ impl GpuPainter {
         let told = std::mem::replace(&mut self.told, true);
         Cut { texels: if told { 0 } else { self.renderer.clipped_texels() }, pixels }
     }
+}
+
+/// Whether something of a layer is seen.
+fn is_seen(layer: &Image) -> bool {
+    layer.alpha.iter().any(|alpha| *alpha > 0.0)
 }
 
 impl Painter for GpuPainter {
@@ -128,7 +131,7 @@ impl Painter for GpuPainter {
                 }
             }
             let plain = match beside.layers {
-                true => self.renderer.render_plain_async(camera, gain).await?,
+                true => self.renderer.render_plain_async(camera, gain).await?.filter(is_seen),
                 false => None,
             };
             let layers = self.with_background(layers, plain, camera, gain);

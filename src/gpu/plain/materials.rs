@@ -22,7 +22,6 @@ pub(super) struct Materials {
     layout: BindGroupLayout,
     bound: Vec<BindGroup>,
     bytes: u64,
-    clipped: usize,
 }
 
 /// Pictures on the device, by where they lie in memory: parts of a mesh share them.
@@ -30,7 +29,6 @@ pub(super) struct Materials {
 struct Pictures {
     known: HashMap<*const Map<4>, TextureView>,
     bytes: u64,
-    clipped: usize,
 }
 
 impl Materials {
@@ -73,7 +71,7 @@ impl Materials {
                 entries: &entries,
             }));
         }
-        Ok(Self { layout, bound, bytes: pictures.bytes, clipped: pictures.clipped })
+        Ok(Self { layout, bound, bytes: pictures.bytes })
     }
 
     pub(super) const fn layout(&self) -> &BindGroupLayout {
@@ -88,11 +86,6 @@ impl Materials {
     pub(super) const fn bytes(&self) -> u64 {
         self.bytes
     }
-
-    /// Texels of pictures that were cut.
-    pub(super) const fn clipped(&self) -> usize {
-        self.clipped
-    }
 }
 
 impl Pictures {
@@ -103,7 +96,6 @@ impl Pictures {
         let texels = texels::picture(map);
         let view = texture(gpu, "picture of a material", &texels)?;
         self.bytes += texels.bytes.len() as u64;
-        self.clipped += texels.clipped;
         self.known.insert(Arc::as_ptr(map), view.clone());
         Ok(view)
     }

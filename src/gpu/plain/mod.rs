@@ -5,7 +5,7 @@
 //! - `rows`: what reaches their vertices; the lights and the sky
 //! - `materials`: what each part is drawn by
 //!
-//! No parameter moves them. Where one moves lights or the environment, the renderer makes them anew.
+//! No constant of the skin moves them. Where lights move or the environment turns, the renderer makes them anew.
 
 mod materials;
 mod rows;
@@ -71,7 +71,6 @@ impl Plain {
         let materials = Materials::new(gpu, &parts.materials)?;
         let layouts = [inputs.layout.clone(), light.layout().clone(), materials.layout().clone()];
         uploads.add_bytes(light.bytes() + materials.bytes());
-        uploads.add_clipped(light.clipped() + materials.clipped());
         let runs = uploads.triangles().plain.clone();
         gpu.check()?;
         Ok(Some(Self { inputs, light, materials, runs, layouts, varyings }))
@@ -109,8 +108,7 @@ impl Plain {
             .collect();
         let target = |&format| Some(ColorTargetState { format, blend: None, write_mask: ColorWrites::ALL });
         let targets: Vec<_> = formats.iter().map(target).collect();
-        let constants =
-            [("axis", f64::from(key.antialias.grid())), ("multisamples", f64::from(multisamples))];
+        let constants = [("multisamples", f64::from(multisamples))];
         device.create_render_pipeline(&RenderPipelineDescriptor {
             label: Some("plain"),
             layout: Some(&layout),
@@ -138,9 +136,10 @@ impl Plain {
         })
     }
 
-    /// Set the constants of what is drawn next.
-    pub(super) fn set(&self, gpu: &Gpu, values: &Values<'_>) {
+    /// Set the constants of what is drawn next, into so many samples along a pixel's side.
+    pub(super) fn set(&self, gpu: &Gpu, values: &Values<'_>, axis: u32) {
         self.inputs.set(gpu, values);
+        self.light.set(gpu, axis);
     }
 
     /// Put what reaches the vertices of another pose in the place of what reached them.

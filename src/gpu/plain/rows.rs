@@ -1,8 +1,10 @@
 //! The light on what is not skin, as shaders read it: rows of each vertex, the lights, and the environment.
 
+use std::ops::Range;
+
 use wgpu::{
     AddressMode, BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
-    BindGroupLayoutEntry, BindingResource, BindingType, Buffer, BufferBindingType, FilterMode,
+    BindGroupLayoutEntry, BindingResource, BindingType, Buffer, BufferBindingType, BufferUsages, FilterMode,
     MipmapFilterMode, SamplerBindingType, SamplerDescriptor, ShaderStages, TextureSampleType,
     TextureViewDimension,
 };
@@ -11,20 +13,26 @@ use super::text::{OWN_ROWS, rows_of};
 use crate::bake::lobe_sky::LobeSky;
 use crate::device::Gpu;
 use crate::error::GpuError;
+use crate::model::cube::Cube;
 use crate::samples::plain_vertices::{PlainVertices, lights};
 use crate::scene::Scene;
 use crate::scene::light::LightKind;
-use crate::texels;
-use crate::upload::texture;
+use crate::texels::{self, Texels};
+use crate::upload::{buffer, texture};
 
 /// The light, bound.
 pub(super) struct Light {
     layout: BindGroupLayout,
     bound: BindGroup,
     vertices: Buffer,
+    /// The vertices that it has rows of.
+    range: Range<usize>,
+    /// What shaders are to know of them and of the targets: `Drawn` of `wgsl/plain.wgsl`.
+    drawn: Buffer,
+    /// What the sky's texels are to be multiplied by.
+    brightness: f32,
     count: usize,
     bytes: u64,
-    clipped: usize,
 }
 
 impl Light {
@@ -33,11 +41,14 @@ impl Light {
     /// # Errors
     /// When it is larger than the adapter takes.
     pub(super) fn new(gpu: &Gpu, scene: &Scene, found: &PlainVertices) -> Result<Self, GpuError> {
-        let rows = vertex_rows(scene, found);
-        let vertices = gpu.storage("vertices of what is not skin", bytemuck::cast_slice(&rows))?;
-        let lamps = light_rows(scene);
-        let lamps = gpu.storage("lights", bytemuck::cast_slice(&lamps))?;
-        let sky = texels::cubes(LobeSky::of_scene(scene).as_ref().map_or(&[], LobeSky::levels));
+        let range = vertices_of(scene);
+        let rows = vertex_rows(scene, found, range.clone());
+        let storage =
+            |what, rows: &[[f32; 4]]| buffer(gpu, what, bytemuck::cast_slice(rows), BufferUsages::STORAGE);
+        let vertices = storage("vertices of what is not skin", &rows)?;
+        let lamps = storage("lights", &light_rows(scene))?;
+        let drawn = gpu.buffer("drawn", &[0; 16], BufferUsages::UNIFORM);
+        let (sky, brightness) = sky(scene);
         let view = texture(gpu, "sky", &sky)?;
         let sampler = gpu.device.create_sampler(&SamplerDescriptor {
             label: Some("sky"),
@@ -54,6 +65,7 @@ impl Light {
             lamps.as_entire_binding(),
             BindingResource::TextureView(&view),
             BindingResource::Sampler(&sampler),
+            drawn.as_entire_binding(),
         ];
         let entries: Vec<_> = (0_u32..)
             .zip(resources)
@@ -65,13 +77,23 @@ impl Light {
             entries: &entries,
         });
         let bytes = vertices.size() + lamps.size() + sky.bytes.len() as u64;
-        let (count, clipped) = (lights(scene).len(), sky.clipped);
-        Ok(Self { layout, bound, vertices, count, bytes, clipped })
+        let count = lights(scene).len();
+        Ok(Self { layout, bound, vertices, range, drawn, brightness, count, bytes })
+    }
+
+    /// Set what is drawn next: into so many samples along a pixel's side.
+    pub(super) fn set(&self, gpu: &Gpu, axis: u32) {
+        let drawn = [axis, self.range.start as u32, self.brightness.to_bits(), 0];
+        gpu.queue.write_buffer(&self.drawn, 0, bytemuck::cast_slice(&drawn));
     }
 
     /// Put what reaches the vertices of another pose in place.
     pub(super) fn set_vertices(&self, gpu: &Gpu, scene: &Scene, found: &PlainVertices) {
-        gpu.queue.write_buffer(&self.vertices, 0, bytemuck::cast_slice(&vertex_rows(scene, found)));
+        gpu.queue.write_buffer(
+            &self.vertices,
+            0,
+            bytemuck::cast_slice(&vertex_rows(scene, found, self.range.clone())),
+        );
     }
 
     pub(super) const fn layout(&self) -> &BindGroupLayout {
@@ -90,21 +112,41 @@ impl Light {
     pub(super) const fn bytes(&self) -> u64 {
         self.bytes
     }
+}
 
-    /// Texels of the environment that were cut.
-    pub(super) const fn clipped(&self) -> usize {
-        self.clipped
+/// From the first to the last vertex of what is not skin.
+fn vertices_of(scene: &Scene) -> Range<usize> {
+    let parts = scene.mesh.plain.iter().flat_map(|parts| &parts.of_triangle);
+    let plain = scene.mesh.triangles.iter().zip(parts).filter(|(_, of)| of.is_some());
+    let vertices = plain.flat_map(|(corners, _)| corners.map(|vertex| vertex as usize));
+    let (first, end) =
+        vertices.fold((usize::MAX, 0), |(first, end), vertex| (first.min(vertex), end.max(vertex + 1)));
+    first.min(end)..end
+}
+
+/// The environment's levels, and what they are to be multiplied by: 16 bits hold numbers up to 65504, and a sun is brighter.
+fn sky(scene: &Scene) -> (Texels, f32) {
+    let sky = LobeSky::of_scene(scene);
+    let levels = sky.as_ref().map_or(&[][..], LobeSky::levels);
+    // No level is brighter than the finest.
+    let finest = levels.first().map_or(&[][..], Cube::padded);
+    let brightest = finest.iter().flatten().fold(0.0_f32, |most, x| most.max(*x));
+    let brightness = (brightest / texels::LARGEST_HALF).max(1.0);
+    let dimmed = |level: &Cube<f32>| level.map(|texel| texel.map(|x| x / brightness));
+    match brightest > texels::LARGEST_HALF {
+        true => (texels::cubes(&levels.iter().map(dimmed).collect::<Vec<_>>()), brightness),
+        false => (texels::cubes(levels), 1.0),
     }
 }
 
-/// The rows of each vertex: the harmonics of what stands in the way in three, the factor on the base colour, then what
+/// The rows of those vertices: the harmonics of what stands in the way in three, the factor on the base colour, then what
 /// arrives of the lights.
-fn vertex_rows(scene: &Scene, found: &PlainVertices) -> Vec<[f32; 4]> {
+fn vertex_rows(scene: &Scene, found: &PlainVertices, range: Range<usize>) -> Vec<[f32; 4]> {
     let lights = lights(scene).len();
     let tints = tints(scene, found.blocked.len());
-    let mut rows = Vec::with_capacity(found.blocked.len() * (OWN_ROWS + rows_of(lights)));
-    for (vertex, blocked) in found.blocked.iter().enumerate() {
-        let [a, b, c, d, e, f, g, h, last] = *blocked;
+    let mut rows = Vec::with_capacity(range.len() * (OWN_ROWS + rows_of(lights)));
+    for vertex in range {
+        let [a, b, c, d, e, f, g, h, last] = found.blocked[vertex];
         rows.extend([[a, b, c, d], [e, f, g, h], [last, 0.0, 0.0, 0.0], tints[vertex]]);
         let arriving = &found.arriving[vertex * lights..][..lights];
         let row = |four: &[f32]| std::array::from_fn(|i| four.get(i).copied().unwrap_or(0.0));
@@ -147,6 +189,11 @@ fn layout(gpu: &Gpu) -> BindGroupLayout {
         has_dynamic_offset: false,
         min_binding_size: None,
     };
+    let drawn = BindingType::Buffer {
+        ty: BufferBindingType::Uniform,
+        has_dynamic_offset: false,
+        min_binding_size: None,
+    };
     let sky = BindingType::Texture {
         sample_type: TextureSampleType::Float { filterable: true },
         view_dimension: TextureViewDimension::Cube,
@@ -157,6 +204,7 @@ fn layout(gpu: &Gpu) -> BindGroupLayout {
         (ShaderStages::FRAGMENT, storage),
         (ShaderStages::FRAGMENT, sky),
         (ShaderStages::FRAGMENT, BindingType::Sampler(SamplerBindingType::Filtering)),
+        (ShaderStages::VERTEX_FRAGMENT, drawn),
     ];
     let entries: Vec<_> = (0_u32..)
         .zip(entries)

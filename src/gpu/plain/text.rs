@@ -29,8 +29,10 @@ impl Varyings {
         if lights <= most as usize {
             return Ok(Self { lights });
         }
-        let reason = format!("{lights} lights shine on what is not skin, of which its shader takes {most}");
-        Err(GpuError::Refused { adapter: gpu.name().to_owned(), reason })
+        let what = format!(
+            "{lights} lights shine on parts that are not skin, and the adapter draws these under {most}"
+        );
+        Err(GpuError::CpuAlone { what })
     }
 
     /// Rows of four lights.
@@ -44,10 +46,14 @@ pub(super) const fn rows_of(lights: usize) -> usize {
     lights.div_ceil(4)
 }
 
-/// The plan of the vertex stage: where a vertex stands, and what fragments are handed of it. Skin's maps have no part.
+/// The plan of the vertex stage: where a vertex stands, and what fragments are handed of it. Skin's maps have no part; the view
+/// is asked for so that the eye is among the constants.
 pub(super) fn placing(facts: &Facts) -> Result<Plan, PlanError> {
-    let goals = ["vertex_position", "vertex_normal", "vertex_uv", "vertex_view"];
-    Plan::search(&raster(facts), &["clip"], &goals, &[])
+    let handed = [("vertex_position", "vec3f"), ("vertex_normal", "vec3f"), ("vertex_uv", "vec2f")];
+    let goals: Vec<&'static str> =
+        ["clip", "vertex_view"].into_iter().chain(handed.map(|(name, _)| name)).collect();
+    let plan = Plan::search(&raster(facts), &goals, &[], &[])?;
+    Ok(Plan { varyings: handed.to_vec(), ..plan })
 }
 
 /// The module for targets that are `hazy` or not; its entry points are `plain_vertex` and `plain_fragment`.
@@ -55,7 +61,7 @@ pub(super) fn module(plan: &Plan, varyings: &Varyings, show: Show, hazy: bool, m
     let mut wgsl = plan.vertex_function("placed");
     let rows = varyings.rows();
     wgsl.push_str(
-        "\nstruct PlainVaryings {\n    @builtin(position) clip: vec4f,\n    @location(0) place: vec3f,\n    \
+        "\nstruct PlainVaryings {\n    @invariant @builtin(position) clip: vec4f,\n    @location(0) place: vec3f,\n    \
          @location(1) normal: vec3f,\n    @location(2) uv: vec2f,\n    @location(3) tint: vec4f,\n    \
          @location(4) blocked_first: vec4f,\n    @location(5) blocked_second: vec4f,\n    \
          @location(6) blocked_last: f32,\n    @location(7) @interpolate(flat) first: u32,\n",
@@ -67,7 +73,7 @@ pub(super) fn module(plan: &Plan, varyings: &Varyings, show: Show, hazy: bool, m
     let _ = write!(
         wgsl,
         "}}\n\n@vertex\nfn plain_vertex(vertex: Vertex) -> PlainVaryings {{\n    let at = placed(vertex);\n    \
-         let row = {}u * vertex.vertex_index;\n    return PlainVaryings(at.clip, at.vertex_position, at.vertex_normal, \
+         let row = {}u * (vertex.vertex_index - drawn.first_vertex);\n    return PlainVaryings(at.clip, at.vertex_position, at.vertex_normal, \
          at.vertex_uv, rows[row + 3u], rows[row], rows[row + 1u], rows[row + 2u].x, vertex.vertex_index{arriving});\n}}\n",
         OWN_ROWS + rows
     );
@@ -113,4 +119,29 @@ fn fragment(show: Show, hazy: bool, multisampled: bool) -> String {
          return PlainFragment({color}{mask});\n}}\n"
     );
     wgsl
+}
+
+#[cfg(test)]
+mod tests {
+    use naga::front::wgsl::parse_str;
+    use naga::valid::{Capabilities, ValidationFlags, Validator};
+
+    use super::*;
+
+    #[test]
+    fn every_module_is_valid() {
+        let plan = placing(&Facts::default()).unwrap();
+        let ways = [(false, false), (true, false), (false, true), (true, true)];
+        for (lights, show) in
+            [0, 1, 5].into_iter().flat_map(|lights| [(lights, Show::Lit), (lights, Show::Hidden)])
+        {
+            for (hazy, multisampled) in ways {
+                let text = module(&plan, &Varyings { lights }, show, hazy, multisampled);
+                let parsed =
+                    parse_str(&text).unwrap_or_else(|error| panic!("{}", error.emit_to_string(&text)));
+                let checked = Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&parsed);
+                checked.unwrap_or_else(|error| panic!("{}", error.emit_to_string(&text)));
+            }
+        }
+    }
 }

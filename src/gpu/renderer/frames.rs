@@ -64,7 +64,9 @@ impl Renderer {
                 let params = &uploads.content().params;
                 let values = Values { params, camera, tile, morph_weights };
                 program.set(gpu, &values);
-                plain.iter().for_each(|(plain, _)| plain.set(gpu, &values));
+                plain
+                    .iter()
+                    .for_each(|(plain, _)| plain.set(gpu, &values, stage.targets.key.antialias.grid()));
                 let mut encoder = gpu.device.create_command_encoder(&CommandEncoderDescriptor::default());
                 uploads.draw_shadow_maps(gpu, &mut encoder, morph_weights, Some(&mut timer));
                 let drawn = Drawn { program, plain, uploads };
@@ -139,7 +141,7 @@ impl Renderer {
             let params = &uploads.content().params;
             let values = Values { params, camera, tile, morph_weights };
             program.set(gpu, &values);
-            plain.iter().for_each(|(plain, _)| plain.set(gpu, &values));
+            plain.iter().for_each(|(plain, _)| plain.set(gpu, &values, stage.targets.key.antialias.grid()));
             let mut encoder =
                 gpu.device.create_command_encoder(&CommandEncoderDescriptor { label: Some("frame") });
             uploads.draw_shadow_maps(gpu, &mut encoder, morph_weights, timer.as_deref_mut());

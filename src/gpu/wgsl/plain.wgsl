@@ -2,8 +2,7 @@
 // CPU's samples trace rays (`samples::plain`); fragments look along the same directions and ask harmonics of their
 // vertices what stands in the way (`samples::plain_vertices`).
 
-// Samples along a pixel's side, or those of a pixel that the hardware keeps.
-override axis: u32 = 1u;
+// Samples of a pixel that the hardware keeps.
 override multisamples: u32 = 1u;
 // Directions of each of the two kinds that are looked along.
 const DIRECTIONS = 32u;
@@ -14,8 +13,17 @@ const LEAST_FACING = 1e-4;
 
 struct Light {
     // The unit vector towards parallel light, or with w = 1 the place of a lamp.
-    from: vec4f,
+    place: vec4f,
     strength: vec4f,
+}
+
+struct Drawn {
+    // Samples along a pixel's side.
+    axis: u32,
+    // The vertex that the first rows are of.
+    first_vertex: u32,
+    // What the sky's texels are to be multiplied by.
+    brightness: f32,
 }
 
 struct Material {
@@ -31,6 +39,7 @@ struct Material {
 // Each level is the mean of the one before. Without an environment a level of black.
 @group(1) @binding(2) var sky: texture_cube<f32>;
 @group(1) @binding(3) var sky_sampler: sampler;
+@group(1) @binding(4) var<uniform> drawn: Drawn;
 @group(2) @binding(0) var<uniform> material: Material;
 @group(2) @binding(1) var color_map: texture_2d<f32>;
 @group(2) @binding(2) var color_sampler: sampler;
@@ -54,11 +63,7 @@ struct Seen {
 }
 
 fn unit_or_zero(v: vec3f) -> vec3f {
-    let largest = max(max(abs(v.x), abs(v.y)), abs(v.z));
-    if (!(largest > 1e-37 && largest < 1e37)) {
-        return vec3f(0.0);
-    }
-    return normalize(v / largest);
+    return normalize_or(v, vec3f(0.0));
 }
 
 fn base_color(at: PlainVaryings) -> vec4f {
@@ -119,25 +124,22 @@ fn sky_along(d: vec3f, solid_angle: f32) -> vec3f {
     let held = clamp(solid_angle, 1e-6, 4.0 * PI);
     let texels = sqrt(4.0 * PI / (6.0 * held));
     let level = log2(f32(textureDimensions(sky).x) / texels);
-    return textureSampleLevel(sky, sky_sampler, d, max(level, 0.0)).rgb;
+    return drawn.brightness * textureSampleLevel(sky, sky_sampler, d, max(level, 0.0)).rgb;
 }
 
-// A frame with Z along n (Duff et al., Building an Orthonormal Basis, Revisited, JCGT 2017).
-fn frame_about(n: vec3f) -> mat3x3f {
-    let side = select(-1.0, 1.0, n.z >= 0.0);
-    let a = -1.0 / (side + n.z);
-    let b = n.x * n.y * a;
-    return mat3x3f(
-        vec3f(1.0 + side * n.x * n.x * a, side * b, -side * n.x),
-        vec3f(b, side + n.y * n.y * a, -n.y),
-        n,
-    );
+// A frame with Z along n and X in the plane of the view: the same directions about that wherever the surface is seen from.
+// Seen straight from above any will do.
+fn frame_about(n: vec3f, view: vec3f) -> mat3x3f {
+    let across = cross(n, view);
+    let other = cross(n, select(vec3f(0.0, 0.0, 1.0), vec3f(1.0, 0.0, 0.0), abs(n.z) > 0.5));
+    let y = unit_or_zero(select(other, across, dot(across, across) > 1e-10));
+    return mat3x3f(cross(y, n), y, n);
 }
 
 // Reflected light of the environment: filtered importance sampling (Krivanek and Colbert 2008), by the cosine and by
 // GGX's distribution of half vectors, over Hammersley's points.
 fn of_sky(at: PlainVaryings, s: Surface, seen: Seen) -> vec3f {
-    let frame = frame_about(seen.normal);
+    let frame = frame_about(seen.normal, seen.view);
     let each = f32(DIRECTIONS);
     var sum = vec3f(0.0);
     for (var i = 0u; i < DIRECTIONS; i++) {
@@ -170,7 +172,7 @@ fn of_sky(at: PlainVaryings, s: Surface, seen: Seen) -> vec3f {
 
 // Reflected light of one light, of whose strength so much arrives.
 fn of_light(at: PlainVaryings, light: Light, arriving: f32, s: Surface, seen: Seen) -> vec3f {
-    let toward = select(light.from.xyz, unit_or_zero(light.from.xyz - at.place), light.from.w > 0.5);
+    let toward = select(light.place.xyz, unit_or_zero(light.place.xyz - at.place), light.place.w > 0.5);
     let n_l = dot(seen.normal, toward);
     if (!(n_l > 0.0)) {
         return vec3f(0.0);
@@ -206,7 +208,7 @@ fn radiance(at: PlainVaryings, plane: vec3f) -> vec3f {
     for (var i = 0u; i < LIGHTS; i++) {
         sum += of_light(at, lights[i], arriving[i / 4u][i % 4u], s, seen);
     }
-    return select(vec3f(0.0), max(sum, vec3f(0.0)), abs(sum) < vec3f(3.0e38));
+    return select(vec3f(0.0), max(sum, vec3f(0.0)), is_finite(sum));
 }
 
 fn hashed(x: u32) -> u32 {
@@ -215,11 +217,16 @@ fn hashed(x: u32) -> u32 {
     return h ^ (h >> 16u);
 }
 
-// Above this alpha the kth of a pixel's samples shows the layer: even over the pixel's, turned by triangle, so that the
-// mean over them is blended in any order (Enderton et al. 2010, Stochastic Transparency, stratified).
-fn threshold(k: u32, count: u32, pixel: vec2u, triangle: u32) -> f32 {
-    let turn = f32(hashed(pixel.x ^ hashed(pixel.y ^ hashed(triangle))) >> 8u) / 16777216.0;
-    return fract((f32((11u * k) % count) + 0.5) / f32(count) + turn);
+// Above this alpha the kth of a pixel's samples shows the layer: even over the pixel's, in an order of each triangle's
+// own, so that the mean over them is blended in any order (Enderton et al. 2010, Stochastic Transparency, stratified).
+fn threshold(k: u32, count: u32, seed: u32) -> f32 {
+    let own = hashed(k ^ seed);
+    var rank = 0u;
+    for (var i = 0u; i < count; i++) {
+        // The hash is one to one: no two are alike.
+        rank += select(0u, 1u, hashed(i ^ seed) < own);
+    }
+    return (f32(rank) + f32(hashed(~seed) >> 8u) / 16777216.0) / f32(count);
 }
 
 // Which of the samples that the hardware keeps of a fragment show it; one, where it keeps one.
@@ -233,12 +240,14 @@ fn samples_shown(at: PlainVaryings) -> u32 {
         return select(0u, all, alpha >= material.emission.a);
     }
     let fragment = vec2u(at.clip.xy);
+    let axis = drawn.axis;
     let pixel = fragment / axis;
+    let seed = hashed(pixel.x ^ hashed(pixel.y ^ hashed(at.first)));
     let place = (fragment.x % axis) + axis * (fragment.y % axis);
     let count = axis * axis * multisamples;
     var mask = 0u;
     for (var k = 0u; k < multisamples; k++) {
-        if (alpha > threshold(place * multisamples + k, count, pixel, at.first)) {
+        if (alpha > threshold(place * multisamples + k, count, seed)) {
             mask |= 1u << k;
         }
     }

@@ -87,10 +87,7 @@ mod gpu {
                 _ => return Ok((Self(None), None)),
             };
             if let Some(what) = content(whole, point).and_then(|whole| whole.scene.cpu_alone()) {
-                return Ok((
-                    Self(None),
-                    Some(format!("GPU time is not measured: {what}, which no adapter draws.")),
-                ));
+                return Ok((Self(None), Some(format!("GPU time is not measured: {what}."))));
             }
             if !gpu.timestamps() {
                 let warning = format!("GPU time is not measured: {} has no timestamps.", gpu.name());

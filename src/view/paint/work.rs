@@ -223,7 +223,10 @@ impl Work {
             timed: false,
             animated: false,
         };
-        Ok(Box::new(GpuPainter::new(gpu.clone(), &opened.baked, options)?))
+        match GpuPainter::new(gpu.clone(), &opened.baked, options) {
+            Err(GpuError::CpuAlone { .. }) => Ok(Box::new(CpuPainter::new(&opened.baked)?)),
+            made => Ok(Box::new(made?)),
+        }
     }
 }
 

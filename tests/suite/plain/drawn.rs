@@ -1,5 +1,7 @@
 //! Parts that are not skin as the renderer draws them, beside the CPU's rays.
 
+use std::f64::consts::FRAC_1_SQRT_2;
+
 use serde_json::{Value, json};
 use skinfit::gpu::{Gpu, RenderOptions, Renderer};
 use skinfit::model::params::Param;
@@ -7,12 +9,11 @@ use skinfit::model::terms::TermName;
 use skinfit::prepare::{Baked, PrepareOptions};
 use skinfit::render::antialias::Antialias;
 use skinfit::render::image::Image;
-use skinfit::render::shading::Shading;
 
 use super::{SCENE, close, edited, folder};
 use crate::common;
 use crate::graphics::bench::{Content, EXACT, cache, gpu, on_cpu, on_gpu};
-use crate::scene_folder::SceneFolder;
+use crate::scene_folder::{SceneFolder, exr};
 
 fn baked(folder: &SceneFolder) -> Baked {
     Baked::new(&folder.path("scene.toml"), &PrepareOptions::default()).unwrap()
@@ -103,39 +104,106 @@ fn holes_and_veils_cast_no_shadow_in_shadow_maps() {
     }
 }
 
+/// A sky that is red on the right and green on the left.
+fn two_coloured() -> Vec<u8> {
+    exr(
+        8,
+        4,
+        &["R", "G", "B"],
+        |c, i| if c == 2 { 0.0 } else { f32::from(u8::from((i % 8 < 4) == (c == 0))) },
+    )
+}
+
 #[test]
-fn what_moves_is_lit_where_it_stands_and_a_turned_sky_turns_on_it() {
+fn a_turned_sky_and_what_moves_are_drawn_as_if_made_so() {
     let Some(gpu) = gpu() else { return };
-    // Red from the right, green from the left.
-    let two = |edit: &dyn Fn(&mut Value, &mut Vec<u8>)| {
-        let eye = json!({"name": "Eye", "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 1}});
-        edited(&eye, &SCENE.replace("\"diffuse\"", "\"diffuse\", \"environment_rotation\""), |mesh, bin| {
-            mesh["nodes"][1]["rotation"] = json!([0.0, 0.382_683, 0.0, 0.923_880]);
-            edit(mesh, bin);
-        })
-    };
-    let folder = two(&|_, _| {});
-    folder.write(
-        "env.exr",
-        &crate::scene_folder::exr(8, 4, &["R", "G", "B"], |c, i| {
-            f32::from(u8::from((i % 8 < 4) == (c == 0)))
-        }),
-    );
+    let eye = json!({"name": "Eye", "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 1}});
+    let folder =
+        edited(&eye, SCENE, |mesh, _| mesh["nodes"][1]["rotation"] = json!([0.0, 0.382_683, 0.0, 0.923_880]));
+    folder.write("env.exr", &two_coloured());
     let baked = baked(&folder);
     let camera = baked.scene.views[0].camera;
-    let options = RenderOptions { shading: Shading::Forward, animated: true, ..EXACT };
+    let options = RenderOptions { animated: true, ..EXACT };
     let mut renderer = Renderer::new(gpu, Content::of(&baked), options).unwrap();
-    let before = renderer.render(&camera, 1.0).unwrap().image.rgb[8 * 16 + 8];
+    let middle = |renderer: &mut Renderer| renderer.render(&camera, 1.0).unwrap().image.rgb[8 * 16 + 8];
+    let before = middle(&mut renderer);
     let mut params = baked.scene.params.clone();
     params.set(Param::EnvironmentRotation, 180.0);
     renderer.set_params(&params).unwrap();
-    let turned = renderer.render(&camera, 1.0).unwrap().image.rgb[8 * 16 + 8];
+    let turned = middle(&mut renderer);
     // Half a turn exchanges the colours.
     assert!((before[0] - before[1]).abs() > 0.1, "{before:?}");
     assert!(close([turned[1], turned[0], turned[2]], before, 1e-2), "{before:?} {turned:?}");
-    // Drawn in the pose that it has already, nothing changes.
-    renderer.set_mesh(&baked.scene.mesh, None).unwrap();
-    assert_eq!(renderer.render(&camera, 1.0).unwrap().image.rgb[8 * 16 + 8], turned);
+    // A pose whose part lies closer to the skin is drawn as a scene that has it there.
+    let mut moved = baked.scene.mesh.clone();
+    let parts = std::sync::Arc::clone(moved.plain.as_ref().unwrap());
+    for (corners, _) in moved.triangles.iter().zip(&parts.of_triangle).filter(|(_, of)| of.is_some()) {
+        corners
+            .iter()
+            .for_each(|&i| moved.positions[i as usize].x = baked.scene.mesh.positions[i as usize].x - 0.3);
+    }
+    renderer.set_params(&baked.scene.params).unwrap();
+    renderer.set_mesh(&moved, None).unwrap();
+    let posed = renderer.render(&camera, 1.0).unwrap().image;
+    let made = on_gpu(gpu, &baked.with_scene(|scene| scene.mesh = moved), EXACT);
+    assert_eq!(posed.rgb, made.rgb);
+}
+
+#[test]
+fn what_stands_beside_a_part_takes_of_its_sky_and_lamps_what_rays_find() {
+    let Some(gpu) = gpu() else { return };
+    let lamps = "[[light]]\nname = \"plain_beside\"\ntype = \"point\"\nposition = [3, 0.5, 2]\nintensity = [20, 20, 20]\n\
+                 [[light]]\nname = \"plain_other\"\ntype = \"spot\"\nposition = [-2, 0, 3]\nintensity = [0, 9, 0]\n\
+                 direction = [2, 0, -2.5]\ninner_degrees = 10\nouter_degrees = 30\n";
+    let lit = SCENE.replace("\"diffuse\"", "\"diffuse\", \"lights\", \"shadows\"") + lamps;
+    let chalk = json!({"name": "Eye", "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0.6, "baseColorFactor": [0.7, 0.7, 0.7, 1]}});
+    // A wall of skin beside the part, and without it.
+    for (wall, turn) in [(false, 0.0_f64), (true, 0.0), (true, 180.0)] {
+        let folder = edited(&chalk, &lit, |mesh, _| {
+            // Turned about, its back is seen: drawn as a front, and lit as one.
+            let half = 0.5 * turn.to_radians();
+            mesh["nodes"][1]["rotation"] = json!([0.0, half.sin(), 0.0, half.cos()]);
+            if wall {
+                let wall = json!({"mesh": 0, "scale": [0.6, 0.6, 0.6], "translation": [0.75, 0, 0.9], "rotation": [0.0, -FRAC_1_SQRT_2, 0.0, FRAC_1_SQRT_2]});
+                mesh["nodes"].as_array_mut().unwrap().push(wall);
+                mesh["scenes"][0]["nodes"] = json!([0, 1, 2]);
+            }
+        });
+        folder.write("env.exr", &two_coloured());
+        let [rays, drawn] = both(gpu, &folder);
+        let mean = |image: &Image| {
+            let inner = (6..10).flat_map(|y| (6..10).map(move |x| image.rgb[y * 16 + x]));
+            inner.fold([0.0_f32; 3], |sum, rgb| std::array::from_fn(|c| sum[c] + rgb[c] / 16.0))
+        };
+        let (rays, drawn) = (mean(&rays), mean(&drawn));
+        // Four corners know of the wall what each of the rays' samples does, in three bands.
+        let tolerance = if wall { 0.12 } else { 0.02 };
+        for c in 0..2 {
+            assert!(
+                (drawn[c] - rays[c]).abs() < tolerance * rays[c],
+                "wall {wall}, {turn}: {drawn:?} is not {rays:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn two_layers_that_blend_hold_back_what_both_do() {
+    let Some(gpu) = gpu() else { return };
+    let veil = json!({"name": "Eye", "alphaMode": "BLEND", "pbrMetallicRoughness": {
+        "metallicFactor": 1, "roughnessFactor": 0, "baseColorFactor": [0, 0, 0, 0.5]}});
+    let folder = edited(&veil, SCENE, |mesh, _| {
+        let second = json!({"mesh": 1, "scale": [0.5, 0.5, 0.5], "translation": [0, 0, 0.6]});
+        mesh["nodes"].as_array_mut().unwrap().push(second);
+        mesh["scenes"][0]["nodes"] = json!([0, 1, 2]);
+    });
+    let options = RenderOptions { antialias: Antialias::Grid(8), ..EXACT };
+    let image = on_gpu(gpu, &baked(&folder), options);
+    let shown: Vec<f32> =
+        (6..10).flat_map(|y| (6..10).map(move |x| y * 16 + x)).map(|i| image.rgb[i][0]).collect();
+    // Of 64 samples in two orders of their own a quarter passes both, with a spread of four of them (hypergeometric: 2.0).
+    let mean = shown.iter().sum::<f32>() / 16.0;
+    assert!((mean - 0.25).abs() < 0.03 && shown.iter().all(|x| (x - 0.25).abs() < 0.15), "{shown:?}");
 }
 
 #[test]

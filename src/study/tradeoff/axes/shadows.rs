@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::quality::ROUNDS;
 use crate::StudyError;
 use crate::gpu::upload::Content;
-use crate::gpu::{Choice, Gpu, GpuError, RenderOptions, Renderer};
+use crate::gpu::{Choice, Gpu, RenderOptions, Renderer};
 use crate::model::effects::Effect;
 use crate::model::gain::Gain;
 use crate::model::shadow_filter::ShadowFilter;
@@ -41,6 +41,9 @@ impl SceneAxis for Shadows {
         let lit = !scene.lights.is_empty() || !scene.sky_lights.is_empty();
         if !shaded || !lit {
             return Err("no light has a shadow");
+        }
+        if scene.cpu_samples().is_some() {
+            return Err("adapters draw other images of it than the processor, whatever the shadows");
         }
         Gpu::open(&Choice::default())
             .map(drop)
@@ -176,8 +179,6 @@ impl<'a> Drawn<'a> {
         evaluated: &Evaluated,
         maps: ShadowMaps,
     ) -> Result<Self, StudyError> {
-        // Of what is not skin shadow maps move nothing that is compared.
-        GpuError::check_sampled(&evaluated.scene)?;
         let mut scene = evaluated.scene.clone();
         scene.shadow_maps = maps;
         // The processor's images here are without it.
