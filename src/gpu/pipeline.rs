@@ -86,10 +86,21 @@ impl Inputs {
         let mut resources =
             plan.resources.iter().map(|&r| uploads.resource(gpu, r)).collect::<Result<Vec<_>, _>>()?;
         resources.extend(levels);
+        Ok(Self::of(gpu, plan, attributes, &resources, stages))
+    }
+
+    /// A plan with what it reads, in its order.
+    pub(super) fn of(
+        gpu: &Gpu,
+        plan: Plan,
+        attributes: Vec<Buffer>,
+        resources: &[Bound],
+        stages: Stages,
+    ) -> Self {
         let constants = constant_buffer(gpu, &plan);
         let layout = layout(gpu, &plan, stages);
-        let bound = bind(gpu, &layout, constants.as_ref(), &resources);
-        Ok(Self { plan, layout, bound, constants, attributes })
+        let bound = bind(gpu, &layout, constants.as_ref(), resources);
+        Self { plan, layout, bound, constants, attributes }
     }
 
     /// Set the constants of what is drawn next; they hold for all that is submitted at once. Returns them.

@@ -14,7 +14,6 @@ use super::readback::Copy;
 use super::resolve::Resolve;
 use super::targets::{Planes, Targets, Tile};
 use super::timing::Timer;
-use super::upload::Uploads;
 use crate::model::gain::Gain;
 use crate::render::image::Image;
 
@@ -30,7 +29,6 @@ pub(super) struct Drawn<'a> {
     pub(super) program: &'a Program<Shaded>,
     /// What is not skin, and what draws it.
     pub(super) plain: Option<(&'a Plain, &'a RenderPipeline)>,
-    pub(super) uploads: &'a Uploads,
 }
 
 /// How a frame ends.
@@ -118,7 +116,7 @@ impl Stage {
         pass.set_viewport(0.0, 0.0, width, height, 0.0, 1.0);
         pipeline.draw(&mut pass);
         if let Some((plain, pipeline)) = shown.plain {
-            plain.draw(&mut pass, pipeline, shown.uploads);
+            plain.draw(&mut pass, pipeline);
         }
     }
 

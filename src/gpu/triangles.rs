@@ -9,6 +9,8 @@ use crate::scene::plain::Alpha;
 /// A mesh's triangles in the order of the device.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Triangles {
+    /// Their places in the mesh.
+    pub(super) order: Vec<u32>,
     /// Their vertices.
     pub(super) corners: Vec<[u32; 3]>,
     /// How many of them are skin.
@@ -24,7 +26,13 @@ impl Triangles {
     pub(super) fn of(mesh: &Mesh) -> Self {
         let count = mesh.triangles.len() as u32;
         let Some(parts) = &mesh.plain else {
-            return Self { corners: mesh.triangles.clone(), skin: count, blocking: count, plain: Vec::new() };
+            return Self {
+                order: (0..count).collect(),
+                corners: mesh.triangles.clone(),
+                skin: count,
+                blocking: count,
+                plain: Vec::new(),
+            };
         };
         let open = |material: u16| {
             parts.materials.get(usize::from(material)).is_some_and(|of| of.alpha != Alpha::Opaque)
@@ -42,7 +50,12 @@ impl Triangles {
             }
         }
         let corners = order.iter().map(|&triangle| mesh.triangles[triangle as usize]).collect();
-        Self { corners, skin: skin as u32, blocking: blocking as u32, plain }
+        Self { order, corners, skin: skin as u32, blocking: blocking as u32, plain }
+    }
+
+    /// Those that are not skin.
+    pub(super) fn of_parts(&self) -> &[[u32; 3]] {
+        &self.corners[self.skin as usize..]
     }
 
     /// Those that are skin.
@@ -77,6 +90,7 @@ mod tests {
         let parts = PlainParts { of_triangle, materials, corner_colors: Vec::new() };
         let mesh = Mesh { triangles: triangles.clone(), plain: Some(Arc::new(parts)), ..Mesh::default() };
         let ordered = Triangles::of(&mesh);
+        assert_eq!(ordered.order, [1, 4, 2, 6, 0, 5, 3]);
         assert_eq!(ordered.corners, [1, 4, 2, 6, 0, 5, 3].map(|i| [i; 3]));
         assert_eq!((ordered.skin, ordered.blocking), (2, 4));
         assert_eq!(ordered.plain, [(1, 2..4), (0, 4..6), (2, 6..7)]);

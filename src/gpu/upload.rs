@@ -118,7 +118,8 @@ impl Uploads {
     /// As [`new`](Self::new), of a mesh whose triangles share no vertices: each knows which corner it is. Its pose is
     /// the scene's for good.
     pub(super) fn by_corner(gpu: &Gpu, content: Content, targets: Vec<usize>) -> Result<Self, GpuError> {
-        let split = vertices::by_corner(&content.scene.mesh, content.occlusion.as_deref());
+        let mesh = &content.scene.mesh;
+        let split = vertices::by_corner(mesh, &mesh.triangles, content.occlusion.as_deref());
         Self::of_mesh(gpu, content, targets, Some(split))
     }
 
@@ -187,6 +188,11 @@ impl Uploads {
 
     pub(super) const fn indices(&self) -> &Buffer {
         &self.indices
+    }
+
+    /// The morph targets that are summed, by their index in the mesh.
+    pub(super) fn targets(&self) -> &[usize] {
+        &self.targets
     }
 
     pub(super) fn vertex_count(&self) -> u64 {

@@ -49,14 +49,17 @@ fn corner_marks(count: usize) -> Vec<[f32; 3]> {
     (0..count).map(|i| Vec3::AXES[i % 3].to_array()).collect()
 }
 
-/// A mesh whose triangles share no vertices, with its occlusion: vertex i is corner i % 3 of triangle i / 3.
-pub(super) fn by_corner(mesh: &Mesh, occlusion: Option<&VertexOcclusion>) -> (Mesh, Option<VertexOcclusion>) {
+/// A mesh of `triangles` of another that share no vertices, with its occlusion: vertex i is corner i % 3 of triangle i / 3.
+pub(super) fn by_corner(
+    mesh: &Mesh,
+    triangles: &[[u32; 3]],
+    occlusion: Option<&VertexOcclusion>,
+) -> (Mesh, Option<VertexOcclusion>) {
     fn each<T: Copy>(of: &[T], triangles: &[[u32; 3]]) -> Vec<T> {
         // What a mesh lacks, its corners lack.
         triangles.as_flattened().iter().filter_map(|&i| of.get(i as usize).copied()).collect()
     }
     let corners = |i: usize| [0, 1, 2].map(|corner| (3 * i + corner) as u32);
-    let triangles = &mesh.triangles;
     let morph = |morph: &Morph| Morph {
         positions: each(&morph.positions, triangles),
         normals: each(&morph.normals, triangles),
@@ -143,7 +146,7 @@ mod tests {
             ..Mesh::default()
         };
         let occlusion = VertexOcclusion { base: vec![0.1, 0.2, 0.3, 0.4], morphs: vec![Vec::new()] };
-        let (split, open) = by_corner(&mesh, Some(&occlusion));
+        let (split, open) = by_corner(&mesh, &mesh.triangles, Some(&occlusion));
         assert_eq!(split.positions, [0.0, 1.0, 2.0, 2.0, 1.0, 3.0].map(at));
         assert_eq!(split.triangles, [[0, 1, 2], [3, 4, 5]]);
         assert_eq!((split.morphs[0].positions.len(), split.morphs[0].weight), (6, 0.5));

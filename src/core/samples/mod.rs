@@ -13,7 +13,7 @@
 //!   maps at a hit; `footprint`: how much of a map a sample covers; `lobe`: rays into a specular lobe there,
 //!   `lobe_light`: the light that they bring; `through`: what comes through the mesh
 //! - `group`: samples packed into groups
-//! - `plain`: what is not skin, as pictures show it; [`plain_vertices`]: what reaches its vertices, for a rasteriser
+//! - `plain`: what is not skin, as pictures show it; [`plain_spread`]: what reaches places on it, for a rasteriser
 //! - [`covered`]: the same groups of samples that a rasteriser found
 //! - [`rows`]: sixteen numbers side by side, the unit of all that is streamed
 //! - [`surface_records`]: what the model reads of each sample, in rows
@@ -36,7 +36,7 @@ mod lit_mesh;
 mod lobe;
 mod lobe_light;
 mod plain;
-pub mod plain_vertices;
+pub mod plain_spread;
 mod posed;
 pub mod rows;
 mod seams;

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::trace::Hit;
 use super::visibility::{Place, Places, Shadows};
-use super::{PosedSurface, plain_vertices};
+use super::{PosedSurface, plain_spread};
 use crate::bake::lobe_sky::LobeSky;
 use crate::bake::low_discrepancy::{Sobol, mix};
 use crate::bake::rays::RayMesh;
@@ -66,7 +66,7 @@ pub(super) fn pixels(
         rays: posed.rays,
         shadows: Shadows::new(posed.mesh, posed.rays, scene.quality.shadow_rays),
         sky: LobeSky::of_scene(scene),
-        lights: plain_vertices::lights(scene),
+        lights: plain_spread::lights(scene),
         spread: Sobol::new(RAYS),
     };
     let eye = camera.eye();

@@ -1,45 +1,14 @@
-//! The text of the shaders that draw what is not skin: the planned vertex stage that places the mesh, what reaches its
-//! vertices, and the fragments of `wgsl/plain.wgsl`.
+//! The text of the shaders that draw what is not skin: the planned vertex stage that places the mesh, and the fragments of
+//! `wgsl/plain.wgsl`.
 
 use std::fmt::Write as _;
 
 use super::Show;
-use crate::device::Gpu;
-use crate::error::GpuError;
 use crate::geometry::raster;
 use crate::shader::{Facts, Plan, PlanError};
 
-/// Rows of a vertex before those of the lights.
-pub(super) const OWN_ROWS: usize = 4;
-/// Varyings beside those of the lights.
-const OWN_VARYINGS: u32 = 8;
-
-/// What fragments are handed of the lights.
-pub(super) struct Varyings {
-    lights: usize,
-}
-
-impl Varyings {
-    /// Of so many lights.
-    ///
-    /// # Errors
-    /// When the adapter hands over fewer numbers.
-    pub(super) fn new(gpu: &Gpu, lights: usize) -> Result<Self, GpuError> {
-        let most = 4 * gpu.device.limits().max_inter_stage_shader_variables.saturating_sub(OWN_VARYINGS);
-        if lights <= most as usize {
-            return Ok(Self { lights });
-        }
-        let what = format!(
-            "{lights} lights shine on parts that are not skin, and the adapter draws these under {most}"
-        );
-        Err(GpuError::CpuAlone { what })
-    }
-
-    /// Rows of four lights.
-    fn rows(&self) -> usize {
-        rows_of(self.lights)
-    }
-}
+/// Rows of a place before those of the lights.
+pub(super) const OWN_ROWS: usize = 5;
 
 /// Rows of four numbers for so many.
 pub(super) const fn rows_of(lights: usize) -> usize {
@@ -56,38 +25,21 @@ pub(super) fn placing(facts: &Facts) -> Result<Plan, PlanError> {
     Ok(Plan { varyings: handed.to_vec(), ..plan })
 }
 
-/// The module for targets that are `hazy` or not; its entry points are `plain_vertex` and `plain_fragment`.
-pub(super) fn module(plan: &Plan, varyings: &Varyings, show: Show, hazy: bool, multisampled: bool) -> String {
+/// The module for targets that are `hazy` or not, under so many lights; its entry points are `plain_vertex` and
+/// `plain_fragment`. After the plan's attributes the vertex stage reads a factor on the base colour.
+pub(super) fn module(plan: &Plan, lights: usize, show: Show, hazy: bool, multisampled: bool) -> String {
     let mut wgsl = plan.vertex_function("placed");
-    let rows = varyings.rows();
-    wgsl.push_str(
-        "\nstruct PlainVaryings {\n    @invariant @builtin(position) clip: vec4f,\n    @location(0) place: vec3f,\n    \
-         @location(1) normal: vec3f,\n    @location(2) uv: vec2f,\n    @location(3) tint: vec4f,\n    \
-         @location(4) blocked_first: vec4f,\n    @location(5) blocked_second: vec4f,\n    \
-         @location(6) blocked_last: f32,\n    @location(7) @interpolate(flat) first: u32,\n",
-    );
-    for row in 0..rows {
-        let _ = writeln!(wgsl, "    @location({}) arriving{row}: vec4f,", OWN_VARYINGS as usize + row);
-    }
-    let arriving: String = (0..rows).map(|row| format!(", rows[row + {}u]", OWN_ROWS + row)).collect();
     let _ = write!(
         wgsl,
-        "}}\n\n@vertex\nfn plain_vertex(vertex: Vertex) -> PlainVaryings {{\n    let at = placed(vertex);\n    \
-         let row = {}u * (vertex.vertex_index - drawn.first_vertex);\n    return PlainVaryings(at.clip, at.vertex_position, at.vertex_normal, \
-         at.vertex_uv, rows[row + 3u], rows[row], rows[row + 1u], rows[row + 2u].x, vertex.vertex_index{arriving});\n}}\n",
-        OWN_ROWS + rows
-    );
-    // WGSL knows no empty arrays.
-    let handed: Vec<String> = match rows {
-        0 => vec!["vec4f(0.0)".to_owned()],
-        _ => (0..rows).map(|row| format!("at.arriving{row}")).collect(),
-    };
-    let _ = write!(
-        wgsl,
-        "\nconst LIGHTS = {}u;\n\nfn arriving_of(at: PlainVaryings) -> array<vec4f, {}> {{\n    return array({});\n}}\n\n",
-        varyings.lights,
-        handed.len(),
-        handed.join(", ")
+        "\nconst LIGHTS = {lights}u;\n// Rows of a place, those of the lights after {OWN_ROWS} others.\n\
+         const ROWS = {}u;\nconst LIGHT_ROWS = {OWN_ROWS}u;\n\n@vertex\n\
+         fn plain_vertex(vertex: Vertex, @location({}) tint: vec4f) -> PlainVaryings {{\n    \
+         let at = placed(vertex);\n    let corner = vertex.vertex_index % 3u;\n    \
+         let shares = vec2f(f32(corner == 1u), f32(corner == 2u));\n    \
+         return PlainVaryings(at.clip, at.vertex_position, at.vertex_normal, at.vertex_uv, tint, shares, \
+         vertex.vertex_index / 3u);\n}}\n\n",
+        OWN_ROWS + rows_of(lights),
+        plan.attributes.len(),
     );
     wgsl.push_str(include_str!("../wgsl/plain.wgsl"));
     wgsl.push_str(&fragment(show, hazy, multisampled));
@@ -136,7 +88,7 @@ mod tests {
             [0, 1, 5].into_iter().flat_map(|lights| [(lights, Show::Lit), (lights, Show::Hidden)])
         {
             for (hazy, multisampled) in ways {
-                let text = module(&plan, &Varyings { lights }, show, hazy, multisampled);
+                let text = module(&plan, lights, show, hazy, multisampled);
                 let parsed =
                     parse_str(&text).unwrap_or_else(|error| panic!("{}", error.emit_to_string(&text)));
                 let checked = Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&parsed);

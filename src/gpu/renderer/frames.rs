@@ -69,7 +69,7 @@ impl Renderer {
                     .for_each(|(plain, _)| plain.set(gpu, &values, stage.targets.key.antialias.grid()));
                 let mut encoder = gpu.device.create_command_encoder(&CommandEncoderDescriptor::default());
                 uploads.draw_shadow_maps(gpu, &mut encoder, morph_weights, Some(&mut timer));
-                let drawn = Drawn { program, plain, uploads };
+                let drawn = Drawn { program, plain };
                 stage.encode_tile(gpu, &mut encoder, &drawn, tile, i == 0, Some(&mut timer));
                 timer.finish(&mut encoder);
                 gpu.queue.submit([encoder.finish()]);
@@ -145,7 +145,7 @@ impl Renderer {
             let mut encoder =
                 gpu.device.create_command_encoder(&CommandEncoderDescriptor { label: Some("frame") });
             uploads.draw_shadow_maps(gpu, &mut encoder, morph_weights, timer.as_deref_mut());
-            let drawn = Drawn { program, plain, uploads };
+            let drawn = Drawn { program, plain };
             stage.encode_tile(gpu, &mut encoder, &drawn, tile, i == 0, timer.as_deref_mut());
             if i + 1 == tiles.len() {
                 copies = stage.encode_end(gpu, &mut encoder, gain, end, timer.as_deref_mut());

@@ -1,6 +1,6 @@
 // What is not skin, by its glTF material (metallic-roughness) under the scene's light, after what places the mesh. The
-// CPU's samples trace rays (`samples::plain`); fragments look along the same directions and ask harmonics of their
-// vertices what stands in the way (`samples::plain_vertices`).
+// CPU's samples trace rays (`samples::plain`); fragments look along as many directions and ask harmonics of places around
+// them what stands in the way (`samples::plain_spread`).
 
 // Samples of a pixel that the hardware keeps.
 override multisamples: u32 = 1u;
@@ -17,11 +17,20 @@ struct Light {
     strength: vec4f,
 }
 
+struct PlainVaryings {
+    @invariant @builtin(position) clip: vec4f,
+    @location(0) place: vec3f,
+    @location(1) normal: vec3f,
+    @location(2) uv: vec2f,
+    @location(3) tint: vec4f,
+    // Weights of the second and the third corner.
+    @location(4) shares: vec2f,
+    @location(5) @interpolate(flat) triangle: u32,
+}
+
 struct Drawn {
     // Samples along a pixel's side.
     axis: u32,
-    // The vertex that the first rows are of.
-    first_vertex: u32,
     // What the sky's texels are to be multiplied by.
     brightness: f32,
 }
@@ -34,12 +43,15 @@ struct Material {
     factors: vec4f,
 }
 
+// Of each place two rows of the first eight harmonics of each side, one of both last ones, and those of the lights.
 @group(1) @binding(0) var<storage, read> rows: array<vec4f>;
-@group(1) @binding(1) var<storage, read> lights: array<Light>;
+// Of each triangle the number of its first place, and the steps along a side.
+@group(1) @binding(1) var<storage, read> spread: array<vec2u>;
+@group(1) @binding(2) var<storage, read> lights: array<Light>;
 // Each level is the mean of the one before. Without an environment a level of black.
-@group(1) @binding(2) var sky: texture_cube<f32>;
-@group(1) @binding(3) var sky_sampler: sampler;
-@group(1) @binding(4) var<uniform> drawn: Drawn;
+@group(1) @binding(3) var sky: texture_cube<f32>;
+@group(1) @binding(4) var sky_sampler: sampler;
+@group(1) @binding(5) var<uniform> drawn: Drawn;
 @group(2) @binding(0) var<uniform> material: Material;
 @group(2) @binding(1) var color_map: texture_2d<f32>;
 @group(2) @binding(2) var color_sampler: sampler;
@@ -55,11 +67,25 @@ struct Surface {
     emission: vec3f,
 }
 
-// What is seen from where: unit vectors, and the cosine between them.
+// The three places around a fragment: where their rows begin, and what each counts.
+struct Around {
+    rows: vec3u,
+    shares: vec3f,
+}
+
+// Harmonics of what stands in the way on the side that is seen.
+struct Blocked {
+    first: vec4f,
+    second: vec4f,
+    last: f32,
+}
+
+// What is seen from where: unit vectors, and the cosine between them; and what stands in the way there.
 struct Seen {
     normal: vec3f,
     view: vec3f,
     facing: f32,
+    blocked: Blocked,
 }
 
 fn unit_or_zero(v: vec3f) -> vec3f {
@@ -110,12 +136,39 @@ fn masking(n_l: f32, n_v: f32, alpha: f32) -> f32 {
     return 0.5 / (n_v * sqrt(a2 + (1.0 - a2) * n_l * n_l) + n_l * sqrt(a2 + (1.0 - a2) * n_v * n_v));
 }
 
+// The places around a fragment, on the even grid over its triangle (Yuksel et al. 2010, Mesh Colors).
+fn around(at: PlainVaryings) -> Around {
+    let triangle = spread[at.triangle];
+    let steps = triangle.y;
+    let place = clamp(at.shares, vec2f(0.0), vec2f(1.0)) * f32(steps);
+    let i = min(u32(place.x), steps - 1u);
+    let j = min(u32(place.y), steps - 1u - i);
+    let part = place - vec2f(f32(i), f32(j));
+    // Row i has steps + 1 - i places.
+    let own = triangle.x + i * (2u * steps + 3u - i) / 2u + j;
+    let next = own + steps + 1u - i;
+    if (part.x + part.y <= 1.0 || i + j + 2u > steps) {
+        return Around(ROWS * vec3u(own, next, own + 1u), vec3f(1.0 - part.x - part.y, part));
+    }
+    return Around(ROWS * vec3u(next + 1u, own + 1u, next), vec3f(part.x + part.y - 1.0, 1.0 - part.x, 1.0 - part.y));
+}
+
+fn row_around(a: Around, row: u32) -> vec4f {
+    return a.shares.x * rows[a.rows.x + row] + a.shares.y * rows[a.rows.y + row] + a.shares.z * rows[a.rows.z + row];
+}
+
+fn blocked_around(a: Around, behind: bool) -> Blocked {
+    let first = select(0u, 2u, behind);
+    let last = row_around(a, 4u);
+    return Blocked(row_around(a, first), row_around(a, first + 1u), select(last.x, last.y, behind));
+}
+
 // The share of the light along d that nothing stands in the way of: 1 less harmonics of three bands.
-fn open_along(at: PlainVaryings, d: vec3f) -> f32 {
+fn open_along(b: Blocked, d: vec3f) -> f32 {
     let second = vec4f(d.x * d.z, d.x * d.y, 1.5 * d.y * d.y - 0.5, d.y * d.z) * vec4f(1.0925484306, 1.0925484306, 0.6307831305, 1.0925484306);
-    let blocked = dot(at.blocked_first, vec4f(0.2820947918, 0.4886025119 * d.x, 0.4886025119 * d.y, 0.4886025119 * d.z))
-        + dot(at.blocked_second, second)
-        + at.blocked_last * 0.5462742153 * (d.z * d.z - d.x * d.x);
+    let blocked = dot(b.first, vec4f(0.2820947918, 0.4886025119 * d.x, 0.4886025119 * d.y, 0.4886025119 * d.z))
+        + dot(b.second, second)
+        + b.last * 0.5462742153 * (d.z * d.z - d.x * d.x);
     return clamp(1.0 - blocked, 0.0, 1.0);
 }
 
@@ -138,7 +191,7 @@ fn frame_about(n: vec3f, view: vec3f) -> mat3x3f {
 
 // Reflected light of the environment: filtered importance sampling (Krivanek and Colbert 2008), by the cosine and by
 // GGX's distribution of half vectors, over Hammersley's points.
-fn of_sky(at: PlainVaryings, s: Surface, seen: Seen) -> vec3f {
+fn of_sky(s: Surface, seen: Seen) -> vec3f {
     let frame = frame_about(seen.normal, seen.view);
     let each = f32(DIRECTIONS);
     var sum = vec3f(0.0);
@@ -149,7 +202,7 @@ fn of_sky(at: PlainVaryings, s: Surface, seen: Seen) -> vec3f {
         let up = sqrt(1.0 - u);
         let toward = frame * vec3f(sqrt(u) * around, up);
         let v_h = dot(seen.view, unit_or_zero(toward + seen.view));
-        let light = open_along(at, toward) * sky_along(toward, PI / (each * max(up, 1e-3)));
+        let light = open_along(seen.blocked, toward) * sky_along(toward, PI / (each * max(up, 1e-3)));
         sum += diffuse_towards(s, v_h) / each * light;
 
         // tan^2 of the half vector's angle.
@@ -163,7 +216,7 @@ fn of_sky(at: PlainVaryings, s: Surface, seen: Seen) -> vec3f {
             let density = distribution(tangent * cosine * cosine, cosine * cosine, s.alpha) * cosine / (4.0 * v_half);
             let masked = masking(n_l, seen.facing, s.alpha) * 4.0 * n_l * seen.facing;
             let weight = masked * v_half / (seen.facing * cosine * each);
-            let bright = open_along(at, mirrored) * sky_along(mirrored, 1.0 / (each * density));
+            let bright = open_along(seen.blocked, mirrored) * sky_along(mirrored, 1.0 / (each * density));
             sum += weight * fresnel(s, v_half) * bright;
         }
     }
@@ -195,18 +248,17 @@ fn radiance(at: PlainVaryings, plane: vec3f) -> vec3f {
         return s.emission;
     }
     // Near the silhouette of a coarse mesh the smooth normal may face away where the triangle does not.
-    if (dot(plane, normal) * dot(plane, view) < 0.0) {
-        normal = -normal;
-    }
+    let behind = dot(plane, normal) * dot(plane, view) < 0.0;
+    normal = select(normal, -normal, behind);
     let cosine = dot(normal, view);
     if (cosine < LEAST_FACING) {
         normal = unit_or_zero(normal + (LEAST_FACING - cosine) * view);
     }
-    let seen = Seen(normal, view, max(dot(normal, view), LEAST_FACING));
-    var sum = s.emission + of_sky(at, s, seen);
-    let arriving = arriving_of(at);
+    let a = around(at);
+    let seen = Seen(normal, view, max(dot(normal, view), LEAST_FACING), blocked_around(a, behind));
+    var sum = s.emission + of_sky(s, seen);
     for (var i = 0u; i < LIGHTS; i++) {
-        sum += of_light(at, lights[i], arriving[i / 4u][i % 4u], s, seen);
+        sum += of_light(at, lights[i], row_around(a, LIGHT_ROWS + i / 4u)[i % 4u], s, seen);
     }
     return select(vec3f(0.0), max(sum, vec3f(0.0)), is_finite(sum));
 }
@@ -242,7 +294,7 @@ fn samples_shown(at: PlainVaryings) -> u32 {
     let fragment = vec2u(at.clip.xy);
     let axis = drawn.axis;
     let pixel = fragment / axis;
-    let seed = hashed(pixel.x ^ hashed(pixel.y ^ hashed(at.first)));
+    let seed = hashed(pixel.x ^ hashed(pixel.y ^ hashed(at.triangle)));
     let place = (fragment.x % axis) + axis * (fragment.y % axis);
     let count = axis * axis * multisamples;
     var mask = 0u;

@@ -223,10 +223,7 @@ impl Work {
             timed: false,
             animated: false,
         };
-        match GpuPainter::new(gpu.clone(), &opened.baked, options) {
-            Err(GpuError::CpuAlone { .. }) => Ok(Box::new(CpuPainter::new(&opened.baked)?)),
-            made => Ok(Box::new(made?)),
-        }
+        Ok(Box::new(GpuPainter::new(gpu.clone(), &opened.baked, options)?))
     }
 }
 

@@ -176,7 +176,7 @@ fn what_stands_beside_a_part_takes_of_its_sky_and_lamps_what_rays_find() {
             inner.fold([0.0_f32; 3], |sum, rgb| std::array::from_fn(|c| sum[c] + rgb[c] / 16.0))
         };
         let (rays, drawn) = (mean(&rays), mean(&drawn));
-        // Four corners know of the wall what each of the rays' samples does, in three bands.
+        // Places spread over the part know of the wall in three bands what each of the rays' samples does.
         let tolerance = if wall { 0.12 } else { 0.02 };
         for c in 0..2 {
             assert!(

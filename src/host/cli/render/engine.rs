@@ -84,11 +84,8 @@ impl EngineArguments {
             let Painting { animated, timed } = painting;
             let options =
                 RenderOptions { antialias, shading: self.shading, budget: self.accuracy, timed, animated };
-            match GpuPainter::new(gpu, baked, options) {
-                Ok(painter) => return Ok(Box::new(painter)),
-                Err(GpuError::CpuAlone { what }) if auto => tell(&format!("{what}: the CPU engine renders.")),
-                Err(error) => return Err(Task::Render.refusal(&error)),
-            }
+            let painter = GpuPainter::new(gpu, baked, options);
+            return Ok(Box::new(painter.map_err(|error| Task::Render.refusal(&error))?));
         }
         let Antialias::Grid(_) = antialias else {
             return Err(Refusal::new(

@@ -1,6 +1,5 @@
-//! The light on what is not skin, as shaders read it: rows of each vertex, the lights, and the environment.
-
-use std::ops::Range;
+//! The light on what is not skin, as shaders read it: what reaches the places that are spread over it, the lights, and the
+//! environment.
 
 use wgpu::{
     AddressMode, BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
@@ -11,12 +10,14 @@ use wgpu::{
 
 use super::text::{OWN_ROWS, rows_of};
 use crate::bake::lobe_sky::LobeSky;
+use crate::bake::rays::RayMesh;
 use crate::device::Gpu;
 use crate::error::GpuError;
 use crate::model::cube::Cube;
-use crate::samples::plain_vertices::{PlainVertices, lights};
+use crate::samples::plain_spread::{Reaching, Spread, lights};
 use crate::scene::Scene;
 use crate::scene::light::LightKind;
+use crate::scene::mesh::Mesh;
 use crate::texels::{self, Texels};
 use crate::upload::{buffer, texture};
 
@@ -24,10 +25,12 @@ use crate::upload::{buffer, texture};
 pub(super) struct Light {
     layout: BindGroupLayout,
     bound: BindGroup,
-    vertices: Buffer,
-    /// The vertices that it has rows of.
-    range: Range<usize>,
-    /// What shaders are to know of them and of the targets: `Drawn` of `wgsl/plain.wgsl`.
+    /// The triangles that it falls on, by their places in the scene's mesh.
+    triangles: Vec<u32>,
+    spread: Spread,
+    /// Rows of each place.
+    reaching: Buffer,
+    /// What shaders are to know of the targets and the sky: `Drawn` of `wgsl/plain.wgsl`.
     drawn: Buffer,
     /// What the sky's texels are to be multiplied by.
     brightness: f32,
@@ -36,17 +39,21 @@ pub(super) struct Light {
 }
 
 impl Light {
-    /// The scene's, with what reaches its vertices.
+    /// The scene's on those triangles of its mesh.
     ///
     /// # Errors
     /// When it is larger than the adapter takes.
-    pub(super) fn new(gpu: &Gpu, scene: &Scene, found: &PlainVertices) -> Result<Self, GpuError> {
-        let range = vertices_of(scene);
-        let rows = vertex_rows(scene, found, range.clone());
-        let storage =
-            |what, rows: &[[f32; 4]]| buffer(gpu, what, bytemuck::cast_slice(rows), BufferUsages::STORAGE);
-        let vertices = storage("vertices of what is not skin", &rows)?;
-        let lamps = storage("lights", &light_rows(scene))?;
+    pub(super) fn new(gpu: &Gpu, scene: &Scene, triangles: Vec<u32>) -> Result<Self, GpuError> {
+        let posed = scene.mesh.pose();
+        let spread = Spread::new(&posed, &triangles);
+        let found = Reaching::new(scene, &posed, &RayMesh::of(&posed), &triangles, &spread);
+        let storage = |what, bytes: &[u8]| -> Result<Buffer, GpuError> {
+            buffer(gpu, what, bytes, BufferUsages::STORAGE)
+        };
+        let count = lights(scene).len();
+        let reaching = storage("light on what is not skin", bytemuck::cast_slice(&rows(&found, count)))?;
+        let places = storage("places on what is not skin", bytemuck::cast_slice(&spread.triangles))?;
+        let lamps = storage("lights", bytemuck::cast_slice(&light_rows(scene)))?;
         let drawn = gpu.buffer("drawn", &[0; 16], BufferUsages::UNIFORM);
         let (sky, brightness) = sky(scene);
         let view = texture(gpu, "sky", &sky)?;
@@ -61,7 +68,8 @@ impl Light {
         });
         let layout = layout(gpu);
         let resources = [
-            vertices.as_entire_binding(),
+            reaching.as_entire_binding(),
+            places.as_entire_binding(),
             lamps.as_entire_binding(),
             BindingResource::TextureView(&view),
             BindingResource::Sampler(&sampler),
@@ -76,24 +84,21 @@ impl Light {
             layout: &layout,
             entries: &entries,
         });
-        let bytes = vertices.size() + lamps.size() + sky.bytes.len() as u64;
-        let count = lights(scene).len();
-        Ok(Self { layout, bound, vertices, range, drawn, brightness, count, bytes })
+        let bytes = reaching.size() + places.size() + lamps.size() + sky.bytes.len() as u64;
+        Ok(Self { layout, bound, triangles, spread, reaching, drawn, brightness, count, bytes })
     }
 
     /// Set what is drawn next: into so many samples along a pixel's side.
     pub(super) fn set(&self, gpu: &Gpu, axis: u32) {
-        let drawn = [axis, self.range.start as u32, self.brightness.to_bits(), 0];
+        let drawn = [axis, self.brightness.to_bits(), 0, 0];
         gpu.queue.write_buffer(&self.drawn, 0, bytemuck::cast_slice(&drawn));
     }
 
-    /// Put what reaches the vertices of another pose in place.
-    pub(super) fn set_vertices(&self, gpu: &Gpu, scene: &Scene, found: &PlainVertices) {
-        gpu.queue.write_buffer(
-            &self.vertices,
-            0,
-            bytemuck::cast_slice(&vertex_rows(scene, found, self.range.clone())),
-        );
+    /// Put what reaches the places in another pose of the mesh in the place of what reached them.
+    pub(super) fn set_mesh(&self, gpu: &Gpu, scene: &Scene, mesh: &Mesh) {
+        let posed = mesh.pose();
+        let found = Reaching::new(scene, &posed, &RayMesh::of(&posed), &self.triangles, &self.spread);
+        gpu.queue.write_buffer(&self.reaching, 0, bytemuck::cast_slice(&rows(&found, self.count)));
     }
 
     pub(super) const fn layout(&self) -> &BindGroupLayout {
@@ -114,14 +119,20 @@ impl Light {
     }
 }
 
-/// From the first to the last vertex of what is not skin.
-fn vertices_of(scene: &Scene) -> Range<usize> {
-    let parts = scene.mesh.plain.iter().flat_map(|parts| &parts.of_triangle);
-    let plain = scene.mesh.triangles.iter().zip(parts).filter(|(_, of)| of.is_some());
-    let vertices = plain.flat_map(|(corners, _)| corners.map(|vertex| vertex as usize));
-    let (first, end) =
-        vertices.fold((usize::MAX, 0), |(first, end), vertex| (first.min(vertex), end.max(vertex + 1)));
-    first.min(end)..end
+/// The rows of each place: two of the first eight harmonics of each side, one of both last ones, then those of the lights.
+fn rows(found: &Reaching, lights: usize) -> Vec<[f32; 4]> {
+    let mut rows = Vec::with_capacity(found.blocked.len() * (OWN_ROWS + rows_of(lights)));
+    for (place, sides) in found.blocked.iter().enumerate() {
+        for [a, b, c, d, e, f, g, h, _] in *sides {
+            rows.extend([[a, b, c, d], [e, f, g, h]]);
+        }
+        let [front, back] = *sides;
+        rows.push([front[8], back[8], 0.0, 0.0]);
+        let arriving = &found.arriving[place * lights..][..lights];
+        let row = |four: &[f32]| std::array::from_fn(|i| four.get(i).copied().unwrap_or(0.0));
+        rows.extend(arriving.chunks(4).map(row));
+    }
+    rows
 }
 
 /// The environment's levels, and what they are to be multiplied by: 16 bits hold numbers up to 65504, and a sun is brighter.
@@ -137,32 +148,6 @@ fn sky(scene: &Scene) -> (Texels, f32) {
         true => (texels::cubes(&levels.iter().map(dimmed).collect::<Vec<_>>()), brightness),
         false => (texels::cubes(levels), 1.0),
     }
-}
-
-/// The rows of those vertices: the harmonics of what stands in the way in three, the factor on the base colour, then what
-/// arrives of the lights.
-fn vertex_rows(scene: &Scene, found: &PlainVertices, range: Range<usize>) -> Vec<[f32; 4]> {
-    let lights = lights(scene).len();
-    let tints = tints(scene, found.blocked.len());
-    let mut rows = Vec::with_capacity(range.len() * (OWN_ROWS + rows_of(lights)));
-    for vertex in range {
-        let [a, b, c, d, e, f, g, h, last] = found.blocked[vertex];
-        rows.extend([[a, b, c, d], [e, f, g, h], [last, 0.0, 0.0, 0.0], tints[vertex]]);
-        let arriving = &found.arriving[vertex * lights..][..lights];
-        let row = |four: &[f32]| std::array::from_fn(|i| four.get(i).copied().unwrap_or(0.0));
-        rows.extend(arriving.chunks(4).map(row));
-    }
-    rows
-}
-
-/// The factor on the base colour at each vertex.
-fn tints(scene: &Scene, count: usize) -> Vec<[f32; 4]> {
-    let mut tints = vec![[1.0; 4]; count];
-    let colors = scene.mesh.plain.as_ref().map_or(&[][..], |parts| &parts.corner_colors);
-    for (corners, colors) in scene.mesh.triangles.iter().zip(colors) {
-        corners.iter().zip(colors).for_each(|(&corner, color)| tints[corner as usize] = *color);
-    }
-    tints
 }
 
 /// Two rows of each light: where its light comes from, and its strength. One of nothing where there is none: a binding
@@ -199,16 +184,16 @@ fn layout(gpu: &Gpu) -> BindGroupLayout {
         view_dimension: TextureViewDimension::Cube,
         multisampled: false,
     };
-    let entries = [
-        (ShaderStages::VERTEX, storage),
-        (ShaderStages::FRAGMENT, storage),
-        (ShaderStages::FRAGMENT, sky),
-        (ShaderStages::FRAGMENT, BindingType::Sampler(SamplerBindingType::Filtering)),
-        (ShaderStages::VERTEX_FRAGMENT, drawn),
-    ];
+    let entries =
+        [storage, storage, storage, sky, BindingType::Sampler(SamplerBindingType::Filtering), drawn];
     let entries: Vec<_> = (0_u32..)
         .zip(entries)
-        .map(|(binding, (visibility, ty))| BindGroupLayoutEntry { binding, visibility, ty, count: None })
+        .map(|(binding, ty)| BindGroupLayoutEntry {
+            binding,
+            visibility: ShaderStages::FRAGMENT,
+            ty,
+            count: None,
+        })
         .collect();
     gpu.device.create_bind_group_layout(&BindGroupLayoutDescriptor {
         label: Some("light on what is not skin"),

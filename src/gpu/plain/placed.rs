@@ -1,0 +1,107 @@
+//! What places the parts that are not skin: the planned vertex stage over triangles that share no vertices, so that each
+//! fragment knows its triangle and where in it it lies.
+
+use std::collections::HashMap;
+
+use wgpu::{Buffer, BufferUsages};
+
+use super::text::placing;
+use crate::constants::Values;
+use crate::device::Gpu;
+use crate::error::GpuError;
+use crate::pipeline::{Inputs, Stages};
+use crate::scene::Scene;
+use crate::scene::mesh::Mesh;
+use crate::shader::{Attribute, Facts, Resource};
+use crate::upload::{Bound, Uploads, buffer};
+use crate::vertices;
+
+/// The parts' corners on the device.
+pub(super) struct Placed {
+    pub(super) inputs: Inputs,
+    /// Factors on the base colour, a corner each.
+    tints: Buffer,
+    /// What the plan reads beside attributes, in its order.
+    resources: Vec<(Resource, Buffer)>,
+    /// The parts' triangles.
+    triangles: Vec<[u32; 3]>,
+    /// The morph targets that are summed.
+    targets: Vec<usize>,
+}
+
+impl Placed {
+    /// Those of the scene that `uploads` are of.
+    ///
+    /// # Errors
+    /// When they are more than the adapter takes.
+    pub(super) fn new(gpu: &Gpu, facts: &Facts, uploads: &Uploads) -> Result<Self, GpuError> {
+        let scene = &*uploads.content().scene;
+        let ordered = uploads.triangles();
+        let (triangles, order) = (ordered.of_parts().to_vec(), &ordered.order[ordered.skin as usize..]);
+        let targets = uploads.targets().to_vec();
+        let plan = placing(facts).map_err(|error| GpuError::Plan(error.to_string()))?;
+        let (split, _) = vertices::by_corner(&scene.mesh, &triangles, None);
+        let attributes = plan.attributes.iter().map(|&attribute| {
+            let bytes = vertices::attribute(attribute, &split, None, &HashMap::new());
+            buffer(gpu, attribute.name(), &bytes, BufferUsages::VERTEX)
+        });
+        let attributes = attributes.collect::<Result<Vec<_>, _>>()?;
+        let resources = plan.resources.iter().map(|&resource| {
+            let rows = rows(resource, &split, &targets);
+            let bytes = bytemuck::cast_slice(&rows);
+            Ok((resource, buffer(gpu, resource.name(), bytes, BufferUsages::STORAGE)?))
+        });
+        let resources = resources.collect::<Result<Vec<_>, GpuError>>()?;
+        let bound: Vec<Bound> = resources.iter().map(|(_, buffer)| Bound::Buffer(buffer.clone())).collect();
+        let tints = tints(scene, order);
+        let tints = buffer(gpu, "tints", bytemuck::cast_slice(&tints), BufferUsages::VERTEX)?;
+        let inputs = Inputs::of(gpu, plan, attributes, &bound, Stages::Raster);
+        Ok(Self { inputs, tints, resources, triangles, targets })
+    }
+
+    /// Set the constants of what is drawn next.
+    pub(super) fn set(&self, gpu: &Gpu, values: &Values<'_>) {
+        self.inputs.set(gpu, values);
+    }
+
+    /// Put another pose of the mesh in the place of the one that is on the device.
+    pub(super) fn set_mesh(&self, gpu: &Gpu, mesh: &Mesh) {
+        let (split, _) = vertices::by_corner(mesh, &self.triangles, None);
+        for (&attribute, buffer) in self.inputs.plan.attributes.iter().zip(&self.inputs.attributes) {
+            if matches!(attribute, Attribute::Position | Attribute::Normal) {
+                let bytes = vertices::attribute(attribute, &split, None, &HashMap::new());
+                gpu.queue.write_buffer(buffer, 0, &bytes);
+            }
+        }
+        for (resource, buffer) in &self.resources {
+            gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&rows(*resource, &split, &self.targets)));
+        }
+    }
+
+    /// What is read of each corner, in the order of the shader's locations.
+    pub(super) fn buffers(&self) -> impl Iterator<Item = &Buffer> {
+        self.inputs.attributes.iter().chain([&self.tints])
+    }
+
+    pub(super) fn bytes(&self) -> u64 {
+        let resources = self.resources.iter().map(|(_, buffer)| buffer);
+        self.buffers().chain(resources).map(Buffer::size).sum()
+    }
+}
+
+/// The rows of what a vertex stage reads beside attributes.
+fn rows(resource: Resource, mesh: &Mesh, targets: &[usize]) -> Vec<[f32; 4]> {
+    match resource {
+        Resource::MorphDeltas => vertices::morph_deltas(mesh, targets, None),
+        Resource::Bones => vertices::bones(&mesh.bones),
+        // Nothing else places a mesh.
+        _ => vec![[0.0; 4]],
+    }
+}
+
+/// The factor on the base colour at each corner of those triangles.
+fn tints(scene: &Scene, triangles: &[u32]) -> Vec<[f32; 4]> {
+    let colors = scene.mesh.plain.as_ref().map_or(&[][..], |parts| &parts.corner_colors);
+    let of = |&triangle: &u32| colors.get(triangle as usize).copied().unwrap_or([[1.0; 4]; 3]);
+    triangles.iter().flat_map(of).collect()
+}
