@@ -9,12 +9,13 @@ use wgpu::{
 };
 
 use super::text::{OWN_ROWS, rows_of};
+use crate::bake::harmonics::CONSTANT;
 use crate::bake::lobe_sky::LobeSky;
 use crate::bake::rays::RayMesh;
 use crate::device::Gpu;
 use crate::error::GpuError;
 use crate::model::cube::Cube;
-use crate::samples::plain_spread::{Reaching, Spread, lights};
+use crate::samples::plain_spread::{HARMONICS, Reaching, Spread, lights};
 use crate::scene::Scene;
 use crate::scene::light::LightKind;
 use crate::scene::mesh::Mesh;
@@ -119,7 +120,16 @@ impl Light {
     }
 }
 
-/// The rows of each place: two of the first eight harmonics of each side, one of both last ones, then those of the lights.
+/// 1, or 0 of a side of a place from which every way is blocked: no eye sees it, and what is seen beside it is not to be
+/// dark for its sake.
+fn seen(blocked: &[f32; HARMONICS]) -> f32 {
+    // The constant function's integral is its inverse; of the rays one alone is 1/128.
+    let share = f64::from(blocked[0]) * CONSTANT;
+    if share < 1.0 - 1.0 / 256.0 { 1.0 } else { 0.0 }
+}
+
+/// The rows of each place: two of the first eight harmonics of each side; one of both last ones, and of which sides are
+/// seen; then those of the lights.
 fn rows(found: &Reaching, lights: usize) -> Vec<[f32; 4]> {
     let mut rows = Vec::with_capacity(found.blocked.len() * (OWN_ROWS + rows_of(lights)));
     for (place, sides) in found.blocked.iter().enumerate() {
@@ -127,7 +137,7 @@ fn rows(found: &Reaching, lights: usize) -> Vec<[f32; 4]> {
             rows.extend([[a, b, c, d], [e, f, g, h]]);
         }
         let [front, back] = *sides;
-        rows.push([front[8], back[8], 0.0, 0.0]);
+        rows.push([front[8], back[8], seen(&front), seen(&back)]);
         let arriving = &found.arriving[place * lights..][..lights];
         let row = |four: &[f32]| std::array::from_fn(|i| four.get(i).copied().unwrap_or(0.0));
         rows.extend(arriving.chunks(4).map(row));
@@ -199,4 +209,15 @@ fn layout(gpu: &Gpu) -> BindGroupLayout {
         label: Some("light on what is not skin"),
         entries: &entries,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_place_that_one_ray_leaves_is_seen_and_one_that_none_leaves_is_not() {
+        let blocked = |rays: f64| [(rays / 128.0 / CONSTANT) as f32, 9.0, 9.0, 9.0, 9.0, 9.0, 9.0, 9.0, 9.0];
+        assert_eq!([0.0, 127.0, 128.0].map(|rays| seen(&blocked(rays))), [1.0, 1.0, 0.0]);
+    }
 }

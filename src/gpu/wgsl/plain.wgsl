@@ -43,7 +43,8 @@ struct Material {
     factors: vec4f,
 }
 
-// Of each place two rows of the first eight harmonics of each side, one of both last ones, and those of the lights.
+// Of each place two rows of the first eight harmonics of each side; one of both last ones, and of which sides any eye sees
+// (1 or 0); and those of the lights.
 @group(1) @binding(0) var<storage, read> rows: array<vec4f>;
 // Of each triangle the number of its first place, and the steps along a side.
 @group(1) @binding(1) var<storage, read> spread: array<vec2u>;
@@ -137,7 +138,7 @@ fn masking(n_l: f32, n_v: f32, alpha: f32) -> f32 {
 }
 
 // The places around a fragment, on the even grid over its triangle (Yuksel et al. 2010, Mesh Colors).
-fn around(at: PlainVaryings) -> Around {
+fn nearest_places(at: PlainVaryings) -> Around {
     let triangle = spread[at.triangle];
     let steps = triangle.y;
     let place = clamp(at.shares, vec2f(0.0), vec2f(1.0)) * f32(steps);
@@ -151,6 +152,16 @@ fn around(at: PlainVaryings) -> Around {
         return Around(ROWS * vec3u(own, next, own + 1u), vec3f(1.0 - part.x - part.y, part));
     }
     return Around(ROWS * vec3u(next + 1u, own + 1u, next), vec3f(part.x + part.y - 1.0, 1.0 - part.x, 1.0 - part.y));
+}
+
+// The same, of which none counts whose side is seen from nowhere, unless all are such.
+fn around(at: PlainVaryings, behind: bool) -> Around {
+    let near = nearest_places(at);
+    let side = select(2u, 3u, behind);
+    let seen = vec3f(rows[near.rows.x + 4u][side], rows[near.rows.y + 4u][side], rows[near.rows.z + 4u][side]);
+    let shares = near.shares * seen;
+    let sum = shares.x + shares.y + shares.z;
+    return Around(near.rows, select(near.shares, shares / max(sum, 1e-6), sum > 1e-6));
 }
 
 fn row_around(a: Around, row: u32) -> vec4f {
@@ -254,7 +265,7 @@ fn radiance(at: PlainVaryings, plane: vec3f) -> vec3f {
     if (cosine < LEAST_FACING) {
         normal = unit_or_zero(normal + (LEAST_FACING - cosine) * view);
     }
-    let a = around(at);
+    let a = around(at, behind);
     let seen = Seen(normal, view, max(dot(normal, view), LEAST_FACING), blocked_around(a, behind));
     var sum = s.emission + of_sky(s, seen);
     for (var i = 0u; i < LIGHTS; i++) {
