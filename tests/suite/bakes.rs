@@ -249,12 +249,14 @@ fn between_its_cubes_the_stack_is_near_a_cube_baked_for_that_exponent() {
         let light = environment(&data.join(format!("env/{name}.exr")), 0.0);
         let radiance = Radiance::new(&light);
         let prefilter = Prefilter::of(&radiance);
+        let baked = [1.5, 6.0, 24.0, 45.0, 100.0, 400.0, 1500.0]
+            .map(|exponent| (exponent, prefilter.lobe(16, exponent, |_| {})));
         for (per_octave, bound) in [(1, bounds[0]), (2, bounds[1])] {
             let exponents = skinfit::bake::lobes::knots(&(1.0..=2048.0), per_octave);
             let cubes = exponents.iter().map(|&e| prefilter.lobe(16, e, |_| {})).collect();
             let stack = LobeStack { exponents, cubes };
-            for exponent in [1.5, 6.0, 24.0, 45.0, 100.0, 400.0, 1500.0] {
-                let (got, want) = (stack.at(exponent).0, prefilter.lobe(16, exponent, |_| {}));
+            for (exponent, want) in &baked {
+                let got = stack.at(*exponent).0;
                 let (mut squares, mut total) = (0.0, 0.0);
                 for (g, w) in got.padded().iter().zip(want.padded()) {
                     squares += (0..3).map(|c| f64::from(g[c] - w[c]).powi(2)).sum::<f64>();

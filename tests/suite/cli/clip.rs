@@ -22,7 +22,7 @@ fn apart(sandbox: &Sandbox, a: &str, b: &str) -> f64 {
 
 #[test]
 fn an_animation_goes_at_its_own_speed_and_around() {
-    let sandbox = Sandbox::new();
+    let sandbox = Sandbox::with_shared_bakes();
     sandbox.run(&["demo", "head"]).done();
     let held: Value =
         serde_json::from_str(&sandbox.run(&["inspect", "head/head.glb", "--json"]).done().out).unwrap();

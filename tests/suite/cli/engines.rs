@@ -109,7 +109,7 @@ fn glb(bytes: &[u8]) -> (Value, &[u8]) {
 
 #[test]
 fn the_open_share_is_an_attribute_of_a_mesh_that_draws_the_same_picture() {
-    let sandbox = Sandbox::new();
+    let sandbox = Sandbox::with_shared_bakes();
     sandbox.run(&["demo", "head"]).done();
     sandbox.run(&["bake", "head/scene.toml", "-o", "baked", "--glb"]).done();
     let file = sandbox.read("baked/vertices.glb");

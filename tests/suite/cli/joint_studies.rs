@@ -210,7 +210,7 @@ fn no_fit_of_a_tradeoff_sees_what_is_held_out_and_what_makes_no_sense_is_refused
 #[test]
 fn stability_tells_which_scene_a_case_is_of() {
     let sandbox = lit();
-    let short = ["--no-gpu", "--cases", "250", "--pixels", "1000", "-o", "stable"];
+    let short = ["--no-gpu", "--cases", "100", "--pixels", "1000", "-o", "stable"];
     let study = |scenes: &[&str], more: &[&str]| {
         let ran = sandbox.run(&[&["stability"], scenes, &short, more].concat());
         (sandbox.json("stable/stability.json"), ran)
