@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::{Mat4, Vec2, Vec3, Vec4};
 
-use super::plain::{Alpha, PlainParts};
+use super::plain::PlainParts;
 use crate::model::fields::Field;
 
 /// A mesh in world units, node transforms applied; not yet morphed or skinned.
@@ -94,9 +94,7 @@ impl PosedMesh {
     /// Its triangles, of which those have no area that have holes or blend: they stand in no light's way.
     #[must_use]
     pub fn occluders(&self) -> Cow<'_, [[u32; 3]]> {
-        let open = |plain: &PlainParts, triangle: usize| {
-            plain.material(triangle as u32).is_some_and(|material| material.alpha != Alpha::Opaque)
-        };
+        let open = |plain: &PlainParts, triangle: usize| plain.is_open(triangle as u32);
         match &self.plain {
             Some(plain) if (0..self.triangles.len()).any(|triangle| open(plain, triangle)) => {
                 let each = self.triangles.iter().enumerate();

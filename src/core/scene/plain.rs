@@ -115,6 +115,12 @@ impl PlainParts {
         self.materials.get(usize::from(place))
     }
 
+    /// Whether a triangle has holes or blends: it stands in no light's way.
+    #[must_use]
+    pub fn is_open(&self, triangle: u32) -> bool {
+        self.material(triangle).is_some_and(|material| material.alpha != Alpha::Opaque)
+    }
+
     /// The factor on a material's base colour at a place of a triangle, by the weights of its corners.
     #[must_use]
     pub fn tint(&self, triangle: u32, weights: [f32; 3]) -> [f32; 4] {
