@@ -253,7 +253,7 @@ impl Renderer {
 
     /// Take other constants, for images at the scene's own pose. Where they change neither the plan nor what it reads,
     /// the next frame reads them from the uniform block, and levels of the UV atlas are made anew; otherwise, as where
-    /// a light moves or a lobe's exponent changes, the renderer is made anew, of a scene that has them.
+    /// the environment turns about parts that are not skin, a light moves or a lobe's exponent changes, the renderer is made anew, of a scene that has them.
     ///
     /// # Errors
     /// As of [`Self::new`].
@@ -261,10 +261,8 @@ impl Renderer {
         let before = &self.uploads.content().params;
         let turned = before.scalar(Param::EnvironmentRotation);
         // What is not skin is lit when it is made.
-        let scene = &self.uploads.content().scene;
         let turns = params.scalar(Param::EnvironmentRotation) != turned;
-        let moves = turns || scene.lights_at(params) != scene.lights_at(before);
-        let lit = self.plain.is_none() || !moves;
+        let lit = self.plain.is_none() || !turns;
         if lit && self.facts.at(params) == self.facts && self.uploads.set_params(params) {
             self.forget();
         } else {

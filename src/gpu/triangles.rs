@@ -4,7 +4,7 @@
 use std::ops::Range;
 
 use crate::scene::mesh::Mesh;
-use crate::scene::plain::Alpha;
+use crate::scene::plain::PlainMaterial;
 
 /// A mesh's triangles in the order of the device.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -34,9 +34,8 @@ impl Triangles {
                 plain: Vec::new(),
             };
         };
-        let open = |material: u16| {
-            parts.materials.get(usize::from(material)).is_some_and(|of| of.alpha != Alpha::Opaque)
-        };
+        let open =
+            |material: u16| parts.materials.get(usize::from(material)).is_some_and(PlainMaterial::is_open);
         let material = |triangle: u32| parts.of_triangle[triangle as usize];
         let mut order: Vec<u32> = (0..count).collect();
         order.sort_by_key(|&triangle| material(triangle).map(|of| (open(of), of)));
@@ -69,7 +68,7 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::scene::plain::{PlainMaterial, PlainParts};
+    use crate::scene::plain::{Alpha, PlainParts};
 
     #[test]
     fn skin_comes_first_and_what_light_passes_last() {

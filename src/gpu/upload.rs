@@ -374,15 +374,13 @@ impl Uploads {
     }
 
     fn storage(&mut self, gpu: &Gpu, what: &str, rows: &[[f32; 4]]) -> Result<Bound, GpuError> {
-        let bytes: &[u8] = bytemuck::cast_slice(rows);
-        let (found, limit) = (bytes.len() as u64, gpu.device.limits().max_storage_buffer_binding_size);
-        check_size(gpu, what, found, limit)?;
-        self.bytes += found;
-        Ok(Bound::Buffer(buffer(gpu, what, bytes, BufferUsages::STORAGE)?))
+        let made = storage(gpu, what, bytemuck::cast_slice(rows))?;
+        self.bytes += made.size();
+        Ok(Bound::Buffer(made))
     }
 
-    /// The whole mesh in a pose of those bones and weights, where what is on the device goes by more than these: shadows
-    /// and what is found at vertices are of the posed surface, which the processor knows of the whole mesh.
+    /// The whole mesh in a pose of those bones and weights, where what is on the device goes by more than these: shadows,
+    /// what is found at vertices and what reaches parts that are not skin are of the posed surface, which the processor knows of the whole mesh.
     pub(super) fn posed_whole(&self, bones: &[Mat4], weights: &[f32]) -> Option<Mesh> {
         let mesh = &self.content.scene.mesh;
         let finds = self.attributes.keys().any(|attribute| matches!(attribute, Attribute::Field(_)));
@@ -471,6 +469,12 @@ pub(super) fn buffer(
     let made = gpu.buffer(label, contents, usage);
     gpu.check()?;
     Ok(made)
+}
+
+/// A buffer that shaders read.
+pub(super) fn storage(gpu: &Gpu, what: &str, bytes: &[u8]) -> Result<Buffer, GpuError> {
+    check_size(gpu, what, bytes.len() as u64, gpu.device.limits().max_storage_buffer_binding_size)?;
+    buffer(gpu, what, bytes, BufferUsages::STORAGE)
 }
 
 pub(crate) fn texture(gpu: &Gpu, name: &str, texels: &Texels) -> Result<TextureView, GpuError> {

@@ -6,7 +6,7 @@ use glam::Vec3A;
 
 use super::panorama::Radiance;
 use crate::model::cube::{Cube, texel_solid_angle};
-use crate::model::params::Param;
+use crate::model::params::{Param, Params};
 use crate::scene::Scene;
 use crate::scene::sky_lights::sky_lights;
 
@@ -21,11 +21,17 @@ impl LobeSky {
     /// That of a scene as its parameters turn it; none where there is no environment.
     #[must_use]
     pub fn of_scene(scene: &Scene) -> Option<Self> {
+        Self::at(scene, &scene.params)
+    }
+
+    /// The same as other parameters turn it.
+    #[must_use]
+    pub fn at(scene: &Scene, params: &Params) -> Option<Self> {
         let environment = scene.environment.as_ref()?;
         // What became lights shines as such.
         let rest = (!scene.sky_lights.is_empty()).then(|| sky_lights(environment).rest);
         let environment = rest.as_ref().unwrap_or(environment);
-        let turn = environment.rotation_degrees + scene.params.scalar(Param::EnvironmentRotation);
+        let turn = environment.rotation_degrees + params.scalar(Param::EnvironmentRotation);
         Some(Self::new(Radiance::turned(environment, turn).to_cube(FINEST)))
     }
 

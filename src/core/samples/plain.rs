@@ -66,7 +66,7 @@ pub(super) fn pixels(
         rays: posed.rays,
         shadows: Shadows::new(posed.mesh, posed.rays, scene.quality.shadow_rays),
         sky: LobeSky::of_scene(scene),
-        lights: plain_spread::lights(scene),
+        lights: plain_spread::lights(scene, &scene.params),
         spread: Sobol::new(RAYS),
     };
     let eye = camera.eye();

@@ -15,6 +15,7 @@ use crate::bake::low_discrepancy::Sobol;
 use crate::bake::rays::RayMesh;
 use crate::bake::vertex_rays::frame;
 use crate::model::effects::Effect;
+use crate::model::params::Params;
 use crate::scene::Scene;
 use crate::scene::light::Light;
 use crate::scene::mesh::PosedMesh;
@@ -51,10 +52,10 @@ pub struct Reaching {
     pub arriving: Vec<f32>,
 }
 
-/// The lights that shine on what is not skin, where the scene's parameters have them stand.
+/// The lights that shine on what is not skin, where `params` have them stand.
 #[must_use]
-pub fn lights(scene: &Scene) -> Vec<Light> {
-    if scene.effects.has(Effect::Lights) { scene.lights_at(&scene.params) } else { Vec::new() }
+pub fn lights(scene: &Scene, params: &Params) -> Vec<Light> {
+    if scene.effects.has(Effect::Lights) { scene.lights_at(params) } else { Vec::new() }
 }
 
 impl Spread {
@@ -110,10 +111,15 @@ const fn places_of(steps: u32) -> u32 {
 impl Reaching {
     /// Of those places over `triangles` of `mesh`, whose triangles are those of `rays`. All cores.
     #[must_use]
-    pub fn new(scene: &Scene, mesh: &PosedMesh, rays: &RayMesh, triangles: &[u32], spread: &Spread) -> Self {
+    pub fn new(
+        (scene, lights): (&Scene, &[Light]),
+        (mesh, rays): (&PosedMesh, &RayMesh),
+        triangles: &[u32],
+        spread: &Spread,
+    ) -> Self {
         let shadows = Shadows::new(mesh, rays, scene.quality.shadow_rays);
         let places = places(mesh, &shadows, triangles, spread);
-        Self { blocked: blocked(rays, &places), arriving: arriving(&lights(scene), &shadows, &places) }
+        Self { blocked: blocked(rays, &places), arriving: arriving(lights, &shadows, &places) }
     }
 }
 

@@ -118,7 +118,7 @@ impl PlainParts {
     /// Whether a triangle has holes or blends: it stands in no light's way.
     #[must_use]
     pub fn is_open(&self, triangle: u32) -> bool {
-        self.material(triangle).is_some_and(|material| material.alpha != Alpha::Opaque)
+        self.material(triangle).is_some_and(PlainMaterial::is_open)
     }
 
     /// The factor on a material's base colour at a place of a triangle, by the weights of its corners.
@@ -153,6 +153,12 @@ impl PlainMap {
 }
 
 impl PlainMaterial {
+    /// Whether it has holes or blends.
+    #[must_use]
+    pub fn is_open(&self) -> bool {
+        self.alpha != Alpha::Opaque
+    }
+
     /// The share of it that is seen at a place of its map, where the mesh has that `tint`: 0 or 1 but where it blends.
     #[must_use]
     pub fn seen(&self, uv: Vec2, tint: [f32; 4]) -> f32 {

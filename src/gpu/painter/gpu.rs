@@ -126,15 +126,13 @@ impl Painter for GpuPainter {
             let frame = self.renderer.render_async(camera, gain).await?;
             let mut layers = Vec::new();
             if beside.layers {
+                let mut terms = Vec::new();
                 for name in self.terms.clone() {
-                    layers.push((name, self.renderer.render_term_async(name, camera, gain).await?));
+                    terms.push((name, self.renderer.render_term_async(name, camera, gain).await?));
                 }
+                let plain = self.renderer.render_plain_async(camera, gain).await?.filter(is_seen);
+                layers = self.with_background(terms, plain, camera, gain);
             }
-            let plain = match beside.layers {
-                true => self.renderer.render_plain_async(camera, gain).await?.filter(is_seen),
-                false => None,
-            };
-            let layers = self.with_background(layers, plain, camera, gain);
             let haze = match beside.haze {
                 true => self.renderer.render_haze_async(camera, gain).await?,
                 false => Vec::new(),

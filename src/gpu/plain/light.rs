@@ -8,19 +8,20 @@ use wgpu::{
     TextureViewDimension,
 };
 
-use super::text::{OWN_ROWS, rows_of};
+use super::text::{OWN_ROWS, Shining, rows_of};
 use crate::bake::harmonics::CONSTANT;
 use crate::bake::lobe_sky::LobeSky;
 use crate::bake::rays::RayMesh;
 use crate::device::Gpu;
 use crate::error::GpuError;
 use crate::model::cube::Cube;
+use crate::model::params::Params;
 use crate::samples::plain_spread::{HARMONICS, Reaching, Spread, lights};
 use crate::scene::Scene;
-use crate::scene::light::LightKind;
+use crate::scene::light::{Light as SceneLight, LightKind};
 use crate::scene::mesh::Mesh;
 use crate::texels::{self, Texels};
-use crate::upload::{buffer, texture};
+use crate::upload::{storage, texture};
 
 /// The light, bound.
 pub(super) struct Light {
@@ -29,13 +30,14 @@ pub(super) struct Light {
     /// The triangles that it falls on, by their places in the scene's mesh.
     triangles: Vec<u32>,
     spread: Spread,
+    lights: Vec<SceneLight>,
+    has_sky: bool,
     /// Rows of each place.
     reaching: Buffer,
-    /// What shaders are to know of the targets and the sky: `Drawn` of `wgsl/plain.wgsl`.
-    drawn: Buffer,
+    /// What shaders are to know of the targets and the sky: `Frame` of `wgsl/plain.wgsl`.
+    frame: Buffer,
     /// What the sky's texels are to be multiplied by.
     brightness: f32,
-    count: usize,
     bytes: u64,
 }
 
@@ -44,19 +46,21 @@ impl Light {
     ///
     /// # Errors
     /// When it is larger than the adapter takes.
-    pub(super) fn new(gpu: &Gpu, scene: &Scene, triangles: Vec<u32>) -> Result<Self, GpuError> {
+    pub(super) fn new(
+        gpu: &Gpu,
+        scene: &Scene,
+        params: &Params,
+        triangles: Vec<u32>,
+    ) -> Result<Self, GpuError> {
         let posed = scene.mesh.pose();
-        let spread = Spread::new(&posed, &triangles);
-        let found = Reaching::new(scene, &posed, &RayMesh::of(&posed), &triangles, &spread);
-        let storage = |what, bytes: &[u8]| -> Result<Buffer, GpuError> {
-            buffer(gpu, what, bytes, BufferUsages::STORAGE)
-        };
-        let count = lights(scene).len();
-        let reaching = storage("light on what is not skin", bytemuck::cast_slice(&rows(&found, count)))?;
-        let places = storage("places on what is not skin", bytemuck::cast_slice(&spread.triangles))?;
-        let lamps = storage("lights", bytemuck::cast_slice(&light_rows(scene)))?;
-        let drawn = gpu.buffer("drawn", &[0; 16], BufferUsages::UNIFORM);
-        let (sky, brightness) = sky(scene);
+        let (spread, lights) = (Spread::new(&posed, &triangles), lights(scene, params));
+        let found = Reaching::new((scene, &lights), (&posed, &RayMesh::of(&posed)), &triangles, &spread);
+        let reaching =
+            storage(gpu, "light on what is not skin", bytemuck::cast_slice(&rows(&found, lights.len())))?;
+        let places = storage(gpu, "places on what is not skin", bytemuck::cast_slice(&spread.triangles))?;
+        let lamps = storage(gpu, "lights", bytemuck::cast_slice(&light_rows(&lights)))?;
+        let frame = gpu.buffer("frame", &[0; 16], BufferUsages::UNIFORM);
+        let (sky, brightness) = sky(scene, params);
         let view = texture(gpu, "sky", &sky)?;
         let sampler = gpu.device.create_sampler(&SamplerDescriptor {
             label: Some("sky"),
@@ -74,7 +78,7 @@ impl Light {
             lamps.as_entire_binding(),
             BindingResource::TextureView(&view),
             BindingResource::Sampler(&sampler),
-            drawn.as_entire_binding(),
+            frame.as_entire_binding(),
         ];
         let entries: Vec<_> = (0_u32..)
             .zip(resources)
@@ -86,20 +90,26 @@ impl Light {
             entries: &entries,
         });
         let bytes = reaching.size() + places.size() + lamps.size() + sky.bytes.len() as u64;
-        Ok(Self { layout, bound, triangles, spread, reaching, drawn, brightness, count, bytes })
+        let has_sky = scene.environment.is_some();
+        Ok(Self { layout, bound, triangles, spread, lights, has_sky, reaching, frame, brightness, bytes })
     }
 
     /// Set what is drawn next: into so many samples along a pixel's side.
     pub(super) fn set(&self, gpu: &Gpu, axis: u32) {
-        let drawn = [axis, self.brightness.to_bits(), 0, 0];
-        gpu.queue.write_buffer(&self.drawn, 0, bytemuck::cast_slice(&drawn));
+        let frame = [axis, self.brightness.to_bits(), 0, 0];
+        gpu.queue.write_buffer(&self.frame, 0, bytemuck::cast_slice(&frame));
     }
 
     /// Put what reaches the places in another pose of the mesh in the place of what reached them.
     pub(super) fn set_mesh(&self, gpu: &Gpu, scene: &Scene, mesh: &Mesh) {
         let posed = mesh.pose();
-        let found = Reaching::new(scene, &posed, &RayMesh::of(&posed), &self.triangles, &self.spread);
-        gpu.queue.write_buffer(&self.reaching, 0, bytemuck::cast_slice(&rows(&found, self.count)));
+        let found = Reaching::new(
+            (scene, &self.lights),
+            (&posed, &RayMesh::of(&posed)),
+            &self.triangles,
+            &self.spread,
+        );
+        gpu.queue.write_buffer(&self.reaching, 0, bytemuck::cast_slice(&rows(&found, self.lights.len())));
     }
 
     pub(super) const fn layout(&self) -> &BindGroupLayout {
@@ -110,9 +120,9 @@ impl Light {
         &self.bound
     }
 
-    /// How many lights there are.
-    pub(super) const fn count(&self) -> usize {
-        self.count
+    /// What shines.
+    pub(super) fn shining(&self) -> Shining {
+        Shining { sky: self.has_sky, lights: self.lights.len() }
     }
 
     pub(super) const fn bytes(&self) -> u64 {
@@ -146,8 +156,8 @@ fn rows(found: &Reaching, lights: usize) -> Vec<[f32; 4]> {
 }
 
 /// The environment's levels, and what they are to be multiplied by: 16 bits hold numbers up to 65504, and a sun is brighter.
-fn sky(scene: &Scene) -> (Texels, f32) {
-    let sky = LobeSky::of_scene(scene);
+fn sky(scene: &Scene, params: &Params) -> (Texels, f32) {
+    let sky = LobeSky::at(scene, params);
     let levels = sky.as_ref().map_or(&[][..], LobeSky::levels);
     // No level is brighter than the finest.
     let finest = levels.first().map_or(&[][..], Cube::padded);
@@ -162,9 +172,9 @@ fn sky(scene: &Scene) -> (Texels, f32) {
 
 /// Two rows of each light: where its light comes from, and its strength. One of nothing where there is none: a binding
 /// cannot be empty.
-fn light_rows(scene: &Scene) -> Vec<[f32; 4]> {
+fn light_rows(lights: &[SceneLight]) -> Vec<[f32; 4]> {
     let mut rows = Vec::new();
-    for light in lights(scene) {
+    for light in lights {
         let from = match &light.kind {
             LightKind::Directional(_) => light.towards(glam::DVec3::ZERO).as_vec3().extend(0.0),
             LightKind::Point(lamp) | LightKind::Spot(lamp, _) => lamp.position.as_vec3().extend(1.0),
@@ -184,7 +194,7 @@ fn layout(gpu: &Gpu) -> BindGroupLayout {
         has_dynamic_offset: false,
         min_binding_size: None,
     };
-    let drawn = BindingType::Buffer {
+    let frame = BindingType::Buffer {
         ty: BufferBindingType::Uniform,
         has_dynamic_offset: false,
         min_binding_size: None,
@@ -195,7 +205,7 @@ fn layout(gpu: &Gpu) -> BindGroupLayout {
         multisampled: false,
     };
     let entries =
-        [storage, storage, storage, sky, BindingType::Sampler(SamplerBindingType::Filtering), drawn];
+        [storage, storage, storage, sky, BindingType::Sampler(SamplerBindingType::Filtering), frame];
     let entries: Vec<_> = (0_u32..)
         .zip(entries)
         .map(|(binding, ty)| BindGroupLayoutEntry {

@@ -65,11 +65,15 @@ impl Plain {
         let scene = Arc::clone(&uploads.content().scene);
         let Some(parts) = &scene.mesh.plain else { return Ok(None) };
         let ordered = uploads.triangles();
+        if ordered.plain.is_empty() {
+            return Ok(None);
+        }
         let first = ordered.skin;
         let corners = |triangles: &Range<u32>| 3 * (triangles.start - first)..3 * (triangles.end - first);
         let runs =
             ordered.plain.iter().map(|(material, triangles)| (*material, corners(triangles))).collect();
-        let light = Light::new(gpu, &scene, ordered.order[first as usize..].to_vec())?;
+        let light =
+            Light::new(gpu, &scene, &uploads.content().params, ordered.order[first as usize..].to_vec())?;
         let placed = Placed::new(gpu, facts, uploads)?;
         let materials = Materials::new(gpu, &parts.materials)?;
         let layouts = [placed.inputs.layout.clone(), light.layout().clone(), materials.layout().clone()];
@@ -83,7 +87,7 @@ impl Plain {
         let device = &gpu.device;
         let (multisamples, formats) = (key.antialias.multisamples(), key.formats());
         let plan = &self.placed.inputs.plan;
-        let wgsl = module(plan, self.light.count(), show, key.hazy, multisamples > 1);
+        let wgsl = module(plan, self.light.shining(), show, key.hazy, multisamples > 1);
         let module = device.create_shader_module(ShaderModuleDescriptor {
             label: Some("plain"),
             source: ShaderSource::Wgsl(wgsl.into()),

@@ -13,7 +13,7 @@ use crate::pipeline::{Inputs, Stages};
 use crate::scene::Scene;
 use crate::scene::mesh::Mesh;
 use crate::shader::{Attribute, Facts, Resource};
-use crate::upload::{Bound, Uploads, buffer};
+use crate::upload::{Bound, Uploads, buffer, storage};
 use crate::vertices;
 
 /// The parts' corners on the device.
@@ -40,7 +40,7 @@ impl Placed {
         let (triangles, order) = (ordered.of_parts().to_vec(), &ordered.order[ordered.skin as usize..]);
         let targets = uploads.targets().to_vec();
         let plan = placing(facts).map_err(|error| GpuError::Plan(error.to_string()))?;
-        let (split, _) = vertices::by_corner(&scene.mesh, &triangles, None);
+        let split = corners(&scene.mesh, &triangles);
         let attributes = plan.attributes.iter().map(|&attribute| {
             let bytes = vertices::attribute(attribute, &split, None, &HashMap::new());
             buffer(gpu, attribute.name(), &bytes, BufferUsages::VERTEX)
@@ -48,8 +48,7 @@ impl Placed {
         let attributes = attributes.collect::<Result<Vec<_>, _>>()?;
         let resources = plan.resources.iter().map(|&resource| {
             let rows = rows(resource, &split, &targets);
-            let bytes = bytemuck::cast_slice(&rows);
-            Ok((resource, buffer(gpu, resource.name(), bytes, BufferUsages::STORAGE)?))
+            Ok((resource, storage(gpu, resource.name(), bytemuck::cast_slice(&rows))?))
         });
         let resources = resources.collect::<Result<Vec<_>, GpuError>>()?;
         let bound: Vec<Bound> = resources.iter().map(|(_, buffer)| Bound::Buffer(buffer.clone())).collect();
@@ -66,7 +65,7 @@ impl Placed {
 
     /// Put another pose of the mesh in the place of the one that is on the device.
     pub(super) fn set_mesh(&self, gpu: &Gpu, mesh: &Mesh) {
-        let (split, _) = vertices::by_corner(mesh, &self.triangles, None);
+        let split = corners(mesh, &self.triangles);
         for (&attribute, buffer) in self.inputs.plan.attributes.iter().zip(&self.inputs.attributes) {
             if matches!(attribute, Attribute::Position | Attribute::Normal) {
                 let bytes = vertices::attribute(attribute, &split, None, &HashMap::new());
@@ -87,6 +86,12 @@ impl Placed {
         let resources = self.resources.iter().map(|(_, buffer)| buffer);
         self.buffers().chain(resources).map(Buffer::size).sum()
     }
+}
+
+/// A mesh of those triangles alone, which share no vertices.
+fn corners(mesh: &Mesh, triangles: &[[u32; 3]]) -> Mesh {
+    let (split, _) = vertices::by_corner(mesh, triangles, None);
+    Mesh { plain: None, ..split }
 }
 
 /// The rows of what a vertex stage reads beside attributes.

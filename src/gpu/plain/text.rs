@@ -25,13 +25,23 @@ pub(super) fn placing(facts: &Facts) -> Result<Plan, PlanError> {
     Ok(Plan { varyings: handed.to_vec(), ..plan })
 }
 
-/// The module for targets that are `hazy` or not, under so many lights; its entry points are `plain_vertex` and
+/// What shines on the parts.
+#[derive(Clone, Copy)]
+pub(super) struct Shining {
+    /// Whether there is an environment.
+    pub(super) sky: bool,
+    /// How many lights there are.
+    pub(super) lights: usize,
+}
+
+/// The module for targets that are `hazy` or not, under that light; its entry points are `plain_vertex` and
 /// `plain_fragment`. After the plan's attributes the vertex stage reads a factor on the base colour.
-pub(super) fn module(plan: &Plan, lights: usize, show: Show, hazy: bool, multisampled: bool) -> String {
+pub(super) fn module(plan: &Plan, shining: Shining, show: Show, hazy: bool, multisampled: bool) -> String {
+    let Shining { sky, lights } = shining;
     let mut wgsl = plan.vertex_function("placed");
     let _ = write!(
         wgsl,
-        "\nconst LIGHTS = {lights}u;\n// Rows of a place, those of the lights after {OWN_ROWS} others.\n\
+        "\nconst SKY = {sky};\nconst LIGHTS = {lights}u;\n// Rows of a place, those of the lights after {OWN_ROWS} others.\n\
          const ROWS = {}u;\nconst LIGHT_ROWS = {OWN_ROWS}u;\n\n@vertex\n\
          fn plain_vertex(vertex: Vertex, @location({}) tint: vec4f) -> PlainVaryings {{\n    \
          let at = placed(vertex);\n    let corner = vertex.vertex_index % 3u;\n    \
@@ -66,7 +76,7 @@ fn fragment(show: Show, hazy: bool, multisampled: bool) -> String {
     let _ = write!(
         wgsl,
         "}}\n\n@fragment\nfn plain_fragment(at: PlainVaryings) -> PlainFragment {{\n    \
-         let plane = cross(unit_or_zero(dpdx(at.place)), unit_or_zero(dpdy(at.place)));\n    \
+         let plane = cross(unit_or_zero(dpdx(at.position)), unit_or_zero(dpdy(at.position)));\n    \
          let mask = samples_shown(at);\n    if (mask == 0u) {{\n        discard;\n    }}\n    \
          return PlainFragment({color}{mask});\n}}\n"
     );
@@ -82,13 +92,15 @@ mod tests {
 
     #[test]
     fn every_module_is_valid() {
-        let plan = placing(&Facts::default()).unwrap();
+        let moves = Facts { morphs: 2, bones: true, ..Facts::default() };
+        let plans = [Facts::default(), moves].map(|facts| placing(&facts).unwrap());
         let ways = [(false, false), (true, false), (false, true), (true, true)];
-        for (lights, show) in
-            [0, 1, 5].into_iter().flat_map(|lights| [(lights, Show::Lit), (lights, Show::Hidden)])
-        {
-            for (hazy, multisampled) in ways {
-                let text = module(&plan, lights, show, hazy, multisampled);
+        for (plan, lights) in plans.iter().flat_map(|plan| [0, 1, 5].map(|lights| (plan, lights))) {
+            for (show, (hazy, multisampled)) in
+                [Show::Lit, Show::Hidden].into_iter().flat_map(|show| ways.map(|way| (show, way)))
+            {
+                let shining = Shining { sky: lights == 0, lights };
+                let text = module(plan, shining, show, hazy, multisampled);
                 let parsed =
                     parse_str(&text).unwrap_or_else(|error| panic!("{}", error.emit_to_string(&text)));
                 let checked = Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&parsed);

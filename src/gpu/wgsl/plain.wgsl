@@ -12,14 +12,14 @@ const LEAST_ALPHA = 1e-3;
 const LEAST_FACING = 1e-4;
 
 struct Light {
-    // The unit vector towards parallel light, or with w = 1 the place of a lamp.
-    place: vec4f,
+    // The unit vector towards parallel light, or with w = 1 the position of a lamp.
+    source: vec4f,
     strength: vec4f,
 }
 
 struct PlainVaryings {
     @invariant @builtin(position) clip: vec4f,
-    @location(0) place: vec3f,
+    @location(0) position: vec3f,
     @location(1) normal: vec3f,
     @location(2) uv: vec2f,
     @location(3) tint: vec4f,
@@ -28,7 +28,7 @@ struct PlainVaryings {
     @location(5) @interpolate(flat) triangle: u32,
 }
 
-struct Drawn {
+struct Frame {
     // Samples along a pixel's side.
     axis: u32,
     // What the sky's texels are to be multiplied by.
@@ -52,7 +52,7 @@ struct Material {
 // Each level is the mean of the one before. Without an environment a level of black.
 @group(1) @binding(3) var sky: texture_cube<f32>;
 @group(1) @binding(4) var sky_sampler: sampler;
-@group(1) @binding(5) var<uniform> drawn: Drawn;
+@group(1) @binding(5) var<uniform> frame: Frame;
 @group(2) @binding(0) var<uniform> material: Material;
 @group(2) @binding(1) var color_map: texture_2d<f32>;
 @group(2) @binding(2) var color_sampler: sampler;
@@ -141,10 +141,12 @@ fn masking(n_l: f32, n_v: f32, alpha: f32) -> f32 {
 fn nearest_places(at: PlainVaryings) -> Around {
     let triangle = spread[at.triangle];
     let steps = triangle.y;
-    let place = clamp(at.shares, vec2f(0.0), vec2f(1.0)) * f32(steps);
-    let i = min(u32(place.x), steps - 1u);
-    let j = min(u32(place.y), steps - 1u - i);
-    let part = place - vec2f(f32(i), f32(j));
+    // The middle of a pixel that the hardware multisamples may lie beside the triangle.
+    let held = clamp(at.shares, vec2f(0.0), vec2f(1.0));
+    let along = held / max(held.x + held.y, 1.0) * f32(steps);
+    let i = min(u32(along.x), steps - 1u);
+    let j = min(u32(along.y), steps - 1u - i);
+    let part = along - vec2f(f32(i), f32(j));
     // Row i has steps + 1 - i places.
     let own = triangle.x + i * (2u * steps + 3u - i) / 2u + j;
     let next = own + steps + 1u - i;
@@ -159,7 +161,7 @@ fn around(at: PlainVaryings, behind: bool) -> Around {
     let near = nearest_places(at);
     let side = select(2u, 3u, behind);
     let seen = vec3f(rows[near.rows.x + 4u][side], rows[near.rows.y + 4u][side], rows[near.rows.z + 4u][side]);
-    let shares = near.shares * seen;
+    let shares = max(near.shares, vec3f(0.0)) * seen;
     let sum = shares.x + shares.y + shares.z;
     return Around(near.rows, select(near.shares, shares / max(sum, 1e-6), sum > 1e-6));
 }
@@ -188,7 +190,7 @@ fn sky_along(d: vec3f, solid_angle: f32) -> vec3f {
     let held = clamp(solid_angle, 1e-6, 4.0 * PI);
     let texels = sqrt(4.0 * PI / (6.0 * held));
     let level = log2(f32(textureDimensions(sky).x) / texels);
-    return drawn.brightness * textureSampleLevel(sky, sky_sampler, d, max(level, 0.0)).rgb;
+    return frame.brightness * textureSampleLevel(sky, sky_sampler, d, max(level, 0.0)).rgb;
 }
 
 // A frame with Z along n and X in the plane of the view: the same directions about that wherever the surface is seen from.
@@ -203,15 +205,15 @@ fn frame_about(n: vec3f, view: vec3f) -> mat3x3f {
 // Reflected light of the environment: filtered importance sampling (Krivanek and Colbert 2008), by the cosine and by
 // GGX's distribution of half vectors, over Hammersley's points.
 fn of_sky(s: Surface, seen: Seen) -> vec3f {
-    let frame = frame_about(seen.normal, seen.view);
+    let turned = frame_about(seen.normal, seen.view);
     let each = f32(DIRECTIONS);
     var sum = vec3f(0.0);
     for (var i = 0u; i < DIRECTIONS; i++) {
         let u = (f32(i) + 0.5) / each;
         let turn = 2.0 * PI * f32(reverseBits(i)) / 4294967296.0;
-        let around = vec2f(cos(turn), sin(turn));
+        let side = vec2f(cos(turn), sin(turn));
         let up = sqrt(1.0 - u);
-        let toward = frame * vec3f(sqrt(u) * around, up);
+        let toward = turned * vec3f(sqrt(u) * side, up);
         let v_h = dot(seen.view, unit_or_zero(toward + seen.view));
         let light = open_along(seen.blocked, toward) * sky_along(toward, PI / (each * max(up, 1e-3)));
         sum += diffuse_towards(s, v_h) / each * light;
@@ -219,7 +221,7 @@ fn of_sky(s: Surface, seen: Seen) -> vec3f {
         // tan^2 of the half vector's angle.
         let tangent = s.alpha * s.alpha * u / (1.0 - u);
         let cosine = inverseSqrt(1.0 + tangent);
-        let half_way = frame * vec3f(sqrt(tangent) * cosine * around, cosine);
+        let half_way = turned * vec3f(sqrt(tangent) * cosine * side, cosine);
         let v_half = dot(seen.view, half_way);
         let mirrored = 2.0 * v_half * half_way - seen.view;
         let n_l = dot(seen.normal, mirrored);
@@ -236,7 +238,7 @@ fn of_sky(s: Surface, seen: Seen) -> vec3f {
 
 // Reflected light of one light, of whose strength so much arrives.
 fn of_light(at: PlainVaryings, light: Light, arriving: f32, s: Surface, seen: Seen) -> vec3f {
-    let toward = select(light.place.xyz, unit_or_zero(light.place.xyz - at.place), light.place.w > 0.5);
+    let toward = select(light.source.xyz, unit_or_zero(light.source.xyz - at.position), light.source.w > 0.5);
     let n_l = dot(seen.normal, toward);
     if (!(n_l > 0.0)) {
         return vec3f(0.0);
@@ -253,7 +255,7 @@ fn of_light(at: PlainVaryings, light: Light, arriving: f32, s: Surface, seen: Se
 // drawn, each as the front.
 fn radiance(at: PlainVaryings, plane: vec3f) -> vec3f {
     let s = surface(at);
-    let view = unit_or_zero(constants.eye.xyz - at.place);
+    let view = unit_or_zero(constants.eye.xyz - at.position);
     var normal = unit_or_zero(at.normal);
     if (all(normal == vec3f(0.0)) || all(view == vec3f(0.0))) {
         return s.emission;
@@ -267,7 +269,10 @@ fn radiance(at: PlainVaryings, plane: vec3f) -> vec3f {
     }
     let a = around(at, behind);
     let seen = Seen(normal, view, max(dot(normal, view), LEAST_FACING), blocked_around(a, behind));
-    var sum = s.emission + of_sky(s, seen);
+    var sum = s.emission;
+    if (SKY) {
+        sum += of_sky(s, seen);
+    }
     for (var i = 0u; i < LIGHTS; i++) {
         sum += of_light(at, lights[i], row_around(a, LIGHT_ROWS + i / 4u)[i % 4u], s, seen);
     }
@@ -303,14 +308,14 @@ fn samples_shown(at: PlainVaryings) -> u32 {
         return select(0u, all, alpha >= material.emission.a);
     }
     let fragment = vec2u(at.clip.xy);
-    let axis = drawn.axis;
+    let axis = frame.axis;
     let pixel = fragment / axis;
     let seed = hashed(pixel.x ^ hashed(pixel.y ^ hashed(at.triangle)));
-    let place = (fragment.x % axis) + axis * (fragment.y % axis);
+    let first = ((fragment.x % axis) + axis * (fragment.y % axis)) * multisamples;
     let count = axis * axis * multisamples;
     var mask = 0u;
     for (var k = 0u; k < multisamples; k++) {
-        if (alpha > threshold(place * multisamples + k, count, seed)) {
+        if (alpha > threshold(first + k, count, seed)) {
             mask |= 1u << k;
         }
     }
