@@ -3,7 +3,9 @@
 use std::f64::consts::FRAC_1_SQRT_2;
 
 use serde_json::{Value, json};
-use skinfit::gpu::{Gpu, RenderOptions, Renderer};
+use skinfit::gpu::painter::{Beside, GpuPainter, Painter as _};
+use skinfit::gpu::{Gpu, GpuError, RenderOptions, Renderer};
+use skinfit::model::gain::Gain;
 use skinfit::model::params::Param;
 use skinfit::model::terms::TermName;
 use skinfit::prepare::{Baked, PrepareOptions};
@@ -96,11 +98,11 @@ fn holes_and_veils_cast_no_shadow_in_shadow_maps() {
     let lit = SCENE
         .replace("\"diffuse\"", "\"lights\", \"shadows\"")
         .replace("[environment]\nfile = \"env.exr\"\n", lamp);
-    for (mode, shaded) in [("OPAQUE", true), ("BLEND", false)] {
+    for (mode, shaded) in [("OPAQUE", true), ("BLEND", false), ("MASK", false)] {
         let eye = json!({"name": "Eye", "alphaMode": mode});
         let image = on_gpu(gpu, &baked(&folder(&eye, &lit)), EXACT);
         let row: Vec<f32> = (0..16).map(|x| image.rgb[8 * 16 + x][0]).collect();
-        assert!(row[2] > 0.1 && (row[13] < 1e-6) == shaded, "{mode}: {row:?}");
+        assert!(row[2] > 0.1 && if shaded { row[13] < 1e-6 } else { row[13] > 0.1 }, "{mode}: {row:?}");
     }
 }
 
@@ -118,10 +120,16 @@ fn two_coloured() -> Vec<u8> {
 fn a_turned_sky_and_what_moves_are_drawn_as_if_made_so() {
     let Some(gpu) = gpu() else { return };
     let eye = json!({"name": "Eye", "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 1}});
+    // A lamp beside it, which is blue and does not turn with the sky.
+    let lamp =
+        "[[light]]\nname = \"plain_blue\"\ntype = \"point\"\nposition = [2, 0, 1]\nintensity = [0, 0, 9]\n";
+    let lit = SCENE.replace("\"diffuse\"", "\"diffuse\", \"lights\", \"shadows\"") + lamp;
     let folder =
-        edited(&eye, SCENE, |mesh, _| mesh["nodes"][1]["rotation"] = json!([0.0, 0.382_683, 0.0, 0.923_880]));
+        edited(&eye, &lit, |mesh, _| mesh["nodes"][1]["rotation"] = json!([0.0, 0.382_683, 0.0, 0.923_880]));
     folder.write("env.exr", &two_coloured());
     let baked = baked(&folder);
+    let refused = GpuError::check_sampled(&baked.scene).unwrap_err().to_string();
+    assert_eq!(refused, "the mesh has parts that are not skin, of which adapters make no samples.");
     let camera = baked.scene.views[0].camera;
     let options = RenderOptions { animated: true, ..EXACT };
     let mut renderer = Renderer::new(gpu, Content::of(&baked), options).unwrap();
@@ -131,10 +139,10 @@ fn a_turned_sky_and_what_moves_are_drawn_as_if_made_so() {
     params.set(Param::EnvironmentRotation, 180.0);
     renderer.set_params(&params).unwrap();
     let turned = middle(&mut renderer);
-    // Half a turn exchanges the colours.
-    assert!((before[0] - before[1]).abs() > 0.1, "{before:?}");
+    // Half a turn exchanges the colours; the 32 directions are not the mirror of themselves.
+    assert!((before[0] - before[1]).abs() > 0.1 && before[2] > 0.1, "{before:?}");
     assert!(close([turned[1], turned[0], turned[2]], before, 1e-2), "{before:?} {turned:?}");
-    // A pose whose part lies closer to the skin is drawn as a scene that has it there.
+    // A pose whose part lies further to the left is drawn as a scene that has it there.
     let mut moved = baked.scene.mesh.clone();
     let parts = std::sync::Arc::clone(moved.plain.as_ref().unwrap());
     for (corners, _) in moved.triangles.iter().zip(&parts.of_triangle).filter(|(_, of)| of.is_some()) {
@@ -176,13 +184,54 @@ fn what_stands_beside_a_part_takes_of_its_sky_and_lamps_what_rays_find() {
             inner.fold([0.0_f32; 3], |sum, rgb| std::array::from_fn(|c| sum[c] + rgb[c] / 16.0))
         };
         let (rays, drawn) = (mean(&rays), mean(&drawn));
-        // Places spread over the part know of the wall in three bands what each of the rays' samples does.
+        // Without a wall what is left is 32 directions of a lobe beside 32 rays of each sample, of a sky of two halves. Beside
+        // it places know in three bands what samples know ray by ray: a step of a half is off by up to an eighth.
         let tolerance = if wall { 0.12 } else { 0.02 };
-        for c in 0..2 {
+        // Blue is the first lamp's alone.
+        for c in 0..3 {
             assert!(
-                (drawn[c] - rays[c]).abs() < tolerance * rays[c],
+                (drawn[c] - rays[c]).abs() < tolerance * rays[c] + 1e-3,
                 "wall {wall}, {turn}: {drawn:?} is not {rays:?}"
             );
+        }
+    }
+}
+
+#[test]
+fn edges_that_the_hardware_multisamples_are_as_bright_as_many_samples_have_them() {
+    let Some(gpu) = gpu() else { return };
+    let lamp = "[[light]]\nname = \"plain_edge\"\ntype = \"point\"\nposition = [2, 1, 3]\nintensity = [20, 20, 20]\n";
+    let lit = SCENE.replace("\"diffuse\"", "\"lights\", \"shadows\"") + lamp;
+    let chalk = json!({"name": "Eye", "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 1}});
+    let baked = baked(&edited(&chalk, &lit, super::shapes::octahedron));
+    let drawn = |antialias| {
+        let camera = baked.scene.views[0].camera;
+        let mut renderer =
+            Renderer::new(gpu, Content::of(&baked), RenderOptions { antialias, ..EXACT }).unwrap();
+        renderer.render_plain(&camera, 1.0).unwrap().unwrap()
+    };
+    let [few, many] = [Antialias::Msaa4, Antialias::Grid(8)].map(drawn);
+    let brightest = many.rgb.iter().map(|rgb| rgb[0]).fold(0.0, f32::max);
+    for (i, (few, many)) in few.rgb.iter().zip(&many.rgb).enumerate() {
+        // A pixel's middle stands for its samples: at an edge between faces half of it is of another one.
+        let off = (few[0] - many[0]).abs();
+        assert!(few[0] >= 0.0 && off < 0.3 * brightest, "pixel {i}: {few:?} {many:?}");
+    }
+}
+
+#[test]
+fn a_picture_without_layers_has_none() {
+    let Some(gpu) = gpu() else { return };
+    let scene = SCENE.replace("fov_y_degrees = 30", "fov_y_degrees = 60\nbackground = \"environment\"");
+    let baked = baked(&folder(&json!({"name": "Eye"}), &scene));
+    let camera = baked.scene.views[0].camera;
+    let mut painter = GpuPainter::new(gpu.clone(), &baked, EXACT).unwrap();
+    for (layers, names) in [(false, vec![]), (true, vec!["diffuse", "plain", "background"])] {
+        let beside = Beside { layers, haze: false };
+        let now = painter.paint(&camera, Gain::ONE, beside).unwrap();
+        let later = pollster::block_on(painter.paint_async(&camera, Gain::ONE, beside)).unwrap();
+        for picture in [now, later] {
+            assert_eq!(picture.layers.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), names);
         }
     }
 }
@@ -228,11 +277,12 @@ fn the_eyes_of_a_path_traced_head_look_as_by_rays() {
             means[1] += f64::from(*got);
         }
     }
-    // What is before the eyes in the sky is known by nine numbers a vertex, and of a sample by 32 rays a lobe.
+    // What is before the eyes in the sky is known by nine numbers a place, and of a sample by 32 rays a lobe, whose noise is
+    // in this, too: an eighth of the radiance a pixel, and a twentieth of its mean.
     let error = (misfit / energy).sqrt();
     let mean = means[1] / means[0];
     println!("eyes: {:.1}% of their radiance, {mean} of its mean; {coverage:?} pixels", 100.0 * error);
     assert!(error < 0.15 && (mean - 1.0).abs() < 0.05, "{error} {mean}");
-    // Samples lie where the rays go: a pixel of rounding.
-    assert!((coverage[0] - coverage[1]).abs() < 0.02 * coverage[0], "{coverage:?}");
+    // Samples lie where the rays go, but for roundings at edges: a pixel in all.
+    assert!((coverage[0] - coverage[1]).abs() < 1.0, "{coverage:?}");
 }

@@ -7,7 +7,7 @@ use super::{SCENE, edited, image, middle_and_skin, sampled};
 
 /// The eye as an octahedron, whose smooth normals are far from those of its faces, turned so that faces are seen from
 /// their edges.
-fn octahedron(mesh: &mut Value, bin: &mut Vec<u8>) {
+pub(super) fn octahedron(mesh: &mut Value, bin: &mut Vec<u8>) {
     let corners: [[f32; 3]; 6] =
         [[1., 0., 0.], [-1., 0., 0.], [0., 1., 0.], [0., -1., 0.], [0., 0., 1.], [0., 0., -1.]];
     let faces: [[u16; 3]; 8] =
