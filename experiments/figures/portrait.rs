@@ -22,6 +22,7 @@ const CONSTANTS: [&str; 7] =
 /// A row a fit: its constants with their errors, and its scores.
 pub(crate) fn measure(lab: &Lab) -> Result<Value> {
     let scene = lab.data.join("mh_portrait/scene.toml");
+    let eyes = eyes(&scene)?;
     let named = lab.scene("eyes told apart", &scene, &[])?;
     let whole = lab.scene("eyes as skin", &scene, &[("mesh.skin", "[\"skin\", \"eyes\"]")])?;
     let mut columns = vec![traced(lab, "mh", &SHOWN)?];
@@ -40,11 +41,11 @@ pub(crate) fn measure(lab: &Lab) -> Result<Value> {
         columns.push(drawn(lab, &run, &SHOWN)?);
     }
     side_by_side(&columns, &SHOWN, "docs/images/portrait.png")?;
-    Ok(json!({ "rows": rows, "eyes": eyes(&scene)? }))
+    Ok(json!({ "rows": rows, "eyes": eyes }))
 }
 
 /// How far the eyes are off that the renderer draws, beside those of the CPU's rays: a row a view, root mean squares in percent
-/// of the radiance that rays find.
+/// of the radiance that rays find, over the pixels where rays find some.
 fn eyes(scene: &Path) -> Result<Vec<Value>> {
     let baked = Baked::new(scene, &PrepareOptions::default())?;
     let gpu = Gpu::open(&Choice::default())?;

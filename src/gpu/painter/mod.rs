@@ -60,7 +60,7 @@ pub struct Cut {
 /// What a picture is to hold beside the image.
 #[derive(Clone, Copy, Debug)]
 pub struct Beside {
-    /// An image for each term and what stands behind the mesh.
+    /// An image for each term, what is not skin and what stands behind the mesh.
     pub layers: bool,
     /// The haze.
     pub haze: bool,

@@ -43,7 +43,7 @@ impl SceneAxis for Shadows {
             return Err("no light has a shadow");
         }
         if scene.cpu_samples().is_some() {
-            return Err("adapters draw other images of it than the processor, whatever the shadows");
+            return Err("adapters draw other images of it than the processor whatever the shadows, or none");
         }
         Gpu::open(&Choice::default())
             .map(drop)
