@@ -277,12 +277,12 @@ fn the_eyes_of_a_path_traced_head_look_as_by_rays() {
             means[1] += f64::from(*got);
         }
     }
-    // What is before the eyes in the sky is known by nine numbers a place, and of a sample by 32 rays a lobe, whose noise is
-    // in this, too: an eighth of the radiance a pixel, and a twentieth of its mean.
+    // What is before the eyes in the sky is known by nine numbers a place: a sixth of the radiance, and with it all of the eye a
+    // little darker. The rays' own noise is in this, too: a twelfth beside 64 samples a pixel.
     let error = (misfit / energy).sqrt();
     let mean = means[1] / means[0];
     println!("eyes: {:.1}% of their radiance, {mean} of its mean; {coverage:?} pixels", 100.0 * error);
-    assert!(error < 0.15 && (mean - 1.0).abs() < 0.05, "{error} {mean}");
+    assert!(error < 0.22 && (mean - 1.0).abs() < 0.08, "{error} {mean}");
     // Samples lie where the rays go, but for roundings at edges: a pixel in all.
     assert!((coverage[0] - coverage[1]).abs() < 1.0, "{coverage:?}");
 }
