@@ -1,5 +1,5 @@
 //! What reaches places that are spread over what is not skin, for a rasteriser: it traces no rays from fragments, as
-//! [`super::plain`] does from samples.
+//! `plain` does from samples.
 //!
 //! Each triangle has places of its own on an even grid, between which fragments interpolate (Yuksel et al. 2010, *Mesh
 //! Colors*). Vertices alone would not do: those of an eye lie behind its lids, and where a few large triangles go on from
