@@ -15,6 +15,7 @@ use skinfit::render::shade::Shader;
 use skinfit::shader::term::register;
 use skinfit::shader::{Facts, plan};
 
+use crate::graphics::bench::cache;
 use crate::graphics::bench::{EXACT, gpu};
 use crate::scene_folder::{SceneFolder, exr, tampered};
 
@@ -64,7 +65,7 @@ fn folder(model: &str, params: &str) -> SceneFolder {
 }
 
 fn baked(folder: &SceneFolder) -> Baked {
-    let options = PrepareOptions { fit: true, ..PrepareOptions::default() };
+    let options = PrepareOptions { fit: true, cache: Some(cache()), ..PrepareOptions::default() };
     Baked::new(&folder.path("scene.toml"), &options).unwrap()
 }
 

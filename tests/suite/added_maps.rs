@@ -15,6 +15,7 @@ use skinfit::shader::facts::MapFacts;
 use skinfit::shader::term::register;
 use skinfit::shader::{Budget, Facts};
 
+use crate::graphics::bench::cache;
 use crate::graphics::bench::{EXACT, gpu};
 use crate::scene_folder::{SCENE, SceneFolder, encode, exr};
 
@@ -82,7 +83,7 @@ fn weighted(own: &str, quality: &str) -> SceneFolder {
 }
 
 fn baked(folder: &SceneFolder) -> Baked {
-    let options = PrepareOptions { fit: true, ..PrepareOptions::default() };
+    let options = PrepareOptions { fit: true, cache: Some(cache()), ..PrepareOptions::default() };
     Baked::new(&folder.path("scene.toml"), &options).unwrap()
 }
 

@@ -137,7 +137,7 @@ outer_degrees = 25
 }
 
 pub(crate) fn baked(folder: &SceneFolder) -> Baked {
-    let options = PrepareOptions { fit: true, ..PrepareOptions::default() };
+    let options = PrepareOptions { fit: true, cache: Some(cache()), ..PrepareOptions::default() };
     Baked::new(&folder.path("scene.toml"), &options).unwrap()
 }
 

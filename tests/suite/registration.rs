@@ -9,6 +9,7 @@ use skinfit::prepare::{Baked, Loaded, PrepareOptions};
 use skinfit::scene::view::Camera;
 
 use crate::common;
+use crate::graphics::bench::cache;
 
 fn read(path: &Path) -> Loaded {
     // Bakes are kept from run to run, under all that they depend on.
@@ -156,6 +157,7 @@ fn what_a_scene_file_asks_for_is_done_and_other_views_stay() {
         assert_eq!(moved.pixels, apart(&baked, &moved.before, &moved.after));
     }
     // A picture of it has the cameras of its file.
-    let drawn = Baked::new(&path, &PrepareOptions::default()).unwrap();
+    let drawn =
+        Baked::new(&path, &PrepareOptions { cache: Some(cache()), ..PrepareOptions::default() }).unwrap();
     assert!(drawn.cameras.is_empty());
 }

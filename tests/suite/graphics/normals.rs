@@ -38,7 +38,12 @@ fn quad(model: SpecularModel, slopes: impl Fn(usize, usize) -> [f64; 2]) -> Bake
     };
     let normal =
         Some(Map { width: TEXELS, height: TEXELS, texels: (0..TEXELS * TEXELS).map(texel).collect() });
-    Baked::new(&folder.path("scene.toml"), &PrepareOptions::default()).unwrap().with_scene(|scene| {
+    Baked::new(
+        &folder.path("scene.toml"),
+        &PrepareOptions { cache: Some(cache()), ..PrepareOptions::default() },
+    )
+    .unwrap()
+    .with_scene(|scene| {
         scene.maps = Maps { normal, ..Maps::default() };
         scene.quality.samples_per_axis = 1;
         scene.choices.specular_model = model;
@@ -115,7 +120,14 @@ fn texels_that_are_short_themselves_widen_nothing() {
             )
             .replace("[quality]\n", "[quality]\ntexture_filter = \"trilinear\"\n");
         folder.write("scene.toml", format!("{scene}{LAMP}").as_bytes());
-        on_cpu(&Baked::new(&folder.path("scene.toml"), &PrepareOptions::default()).unwrap(), 1)
+        on_cpu(
+            &Baked::new(
+                &folder.path("scene.toml"),
+                &PrepareOptions { cache: Some(cache()), ..PrepareOptions::default() },
+            )
+            .unwrap(),
+            1,
+        )
     };
     // A unit normal in f32 is short by some roundings, 1e-7 of a variance of 0.06.
     assert!(error(&of(NormalFilter::None), &of(NormalFilter::Toksvig)) < 1e-4);

@@ -30,7 +30,12 @@ fn quad(angle: f64, size: u32, texel: impl Fn(usize, usize) -> f32) -> Baked {
     folder.write("scene.toml", scene.as_bytes());
     let texels = (0..TEXELS * TEXELS).map(|i| [texel(i % TEXELS, i / TEXELS); 3]).collect();
     let color = Some(Map { width: TEXELS, height: TEXELS, texels });
-    Baked::new(&folder.path("scene.toml"), &PrepareOptions::default()).unwrap().with_scene(|scene| {
+    Baked::new(
+        &folder.path("scene.toml"),
+        &PrepareOptions { cache: Some(cache()), ..PrepareOptions::default() },
+    )
+    .unwrap()
+    .with_scene(|scene| {
         scene.maps = Maps { color, ..Maps::default() };
         scene.quality.samples_per_axis = 1;
     })

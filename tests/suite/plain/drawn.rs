@@ -18,7 +18,11 @@ use crate::graphics::bench::{Content, EXACT, cache, gpu, on_cpu, on_gpu};
 use crate::scene_folder::{SceneFolder, exr};
 
 fn baked(folder: &SceneFolder) -> Baked {
-    Baked::new(&folder.path("scene.toml"), &PrepareOptions::default()).unwrap()
+    Baked::new(
+        &folder.path("scene.toml"),
+        &PrepareOptions { cache: Some(cache()), ..PrepareOptions::default() },
+    )
+    .unwrap()
 }
 
 fn both(gpu: &Gpu, folder: &SceneFolder) -> [Image; 2] {

@@ -66,7 +66,7 @@ fn edited(material: &Value, scene: &str, edit: impl FnOnce(&mut Value, &mut Vec<
 }
 
 fn sampled(folder: &SceneFolder) -> Sampled {
-    let options = PrepareOptions { fit: true, ..PrepareOptions::default() };
+    let options = PrepareOptions { fit: true, cache: Some(cache()), ..PrepareOptions::default() };
     Baked::new(&folder.path("scene.toml"), &options).unwrap().sample().unwrap()
 }
 

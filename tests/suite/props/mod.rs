@@ -22,7 +22,7 @@ use skinfit::prepare::{Baked, PrepareOptions};
 use skinfit::render::files::{ImageOptions, write_image};
 use skinfit::render::image::Image;
 
-use crate::graphics::bench::on_cpu;
+use crate::graphics::bench::{cache, on_cpu};
 use crate::scene_folder::{SceneFolder, encode, exr};
 use file::File;
 
@@ -81,7 +81,11 @@ impl Prop {
              [[view]]\nname = \"front\"\n{camera}\nwidth = {SIZE}\nheight = {SIZE}\n"
         );
         folder.write("scene.toml", text.as_bytes());
-        Baked::new(&folder.path("scene.toml"), &PrepareOptions::default()).unwrap()
+        Baked::new(
+            &folder.path("scene.toml"),
+            &PrepareOptions { cache: Some(cache()), ..PrepareOptions::default() },
+        )
+        .unwrap()
     }
 
     /// What the CPU engine shows of it, by two samples along a pixel's side.
