@@ -233,10 +233,10 @@ mod tests {
         let below = of(&squares(1.0));
         assert_eq!(below.len(), 9);
         for [front, back] in &below {
-            // All but what is within a thousandth of the horizon: the constant function, both halves of it. 128 even
-            // points leave a few hundredths in the other bands.
+            // All but what is within a thousandth of the horizon: the constant function, both halves of it. In the other bands
+            // 128 random points would leave 0.2, even ones leave less.
             for d in [Vec3::Z, Vec3::new(1.0, 0.5, 0.4), Vec3::new(-0.3, 0.2, -1.0)] {
-                assert!((along(front, d) - 1.0).abs() < 0.05, "{d}: {}", along(front, d));
+                assert!((along(front, d) - 1.0).abs() < 0.2, "{d}: {}", along(front, d));
             }
             // Nothing is below, exactly.
             assert_eq!(*back, [0.0; HARMONICS]);
