@@ -78,7 +78,7 @@ fn scene((choices, params): (&str, &str), edits: &[(&str, &str)]) -> SceneFolder
     folder
 }
 
-fn assert_finite(baked: &Baked, what: &str) {
+fn assert_finite(baked: &Baked, what: &str, on_adapter: bool) {
     let finite = |rgb: &[[f32; 3]]| rgb.iter().flatten().all(|x| x.is_finite());
     assert!(finite(&image(baked).rgb), "{what}: image");
     let observed = baked.clone().sample().unwrap().observe().unwrap();
@@ -101,7 +101,7 @@ fn assert_finite(baked: &Baked, what: &str) {
     let (loss, slopes) = exact.gradient(&point);
     assert!(loss.is_finite() && slopes.iter().all(|x| x.is_finite()), "{what}: in f64: {loss} {slopes:?}");
     check(&CpuEngine::new(task()).unwrap(), "cpu");
-    let Some(gpu) = gpu() else { return };
+    let Some(gpu) = gpu().filter(|_| on_adapter) else { return };
     check(&GpuEngine::new(gpu, task(), &point, Memory::default()).unwrap(), "gpu");
     #[cfg(feature = "burn")]
     {
@@ -115,12 +115,19 @@ fn assert_finite(baked: &Baked, what: &str) {
     assert!(finite(&drawn.rgb), "{what}: drawn");
 }
 
-/// Those edits and what `change` makes of the folder, under one way; ways are taken in turn, as engines take a second each.
+/// Those edits and what `change` makes of the folder, under one way. Ways are taken in turn, and an adapter with every other one,
+/// as its driver takes seconds over the shaders of each.
 fn one_way(number: usize, what: &str, edits: &[(&str, &str)], change: impl Fn(&SceneFolder)) {
+    under(number, number.is_multiple_of(2), what, edits, change);
+}
+
+/// The same, on an adapter or not.
+fn under(number: usize, on_adapter: bool, what: &str, edits: &[(&str, &str)], change: impl Fn(&SceneFolder)) {
     let way = WAYS[number % WAYS.len()];
     let folder = scene(way, edits);
     change(&folder);
-    assert_finite(&baked(&folder), &format!("{what}: {}", way.0.replace('\n', ", ")));
+    let what = format!("{what}: {}", way.0.replace('\n', ", "));
+    assert_finite(&baked(&folder), &what, on_adapter);
 }
 
 const CAMERA: &str = "[1,0,0,0, 0,1,0,0, 0,0,1,-2, 0,0,0,1]";
@@ -137,7 +144,7 @@ fn light_and_view_that_graze() {
     let aside = "[0,0,-1,0.0022, 0,1,0,0, 1,0,0,-2, 0,0,0,1]";
     let edits = [(CAMERA, aside), ("fov_y_degrees = 30", "fov_y_degrees = 1")];
     for way in [1, 3] {
-        one_way(way, "view", &edits, |folder| folder.write("normal.png", &png(4, 4, [128, 128, 255])));
+        under(way, true, "view", &edits, |folder| folder.write("normal.png", &png(4, 4, [128, 128, 255])));
     }
 }
 
@@ -168,7 +175,7 @@ fn lights_that_bring_nothing_and_panoramas_without_bright_places() {
         ("irradiance = [3.0, 2.9, 2.7]", "irradiance = [0.0, 0.0, 0.0]"),
         ("intensity = [2.0, 3.0, 4.0]", "intensity = [0.0, 0.0, 0.0]"),
     ];
-    one_way(1, "black", &black, |_| {});
+    under(1, true, "black", &black, |_| {});
     let many = ("lights = 1", "lights = 8");
     one_way(0, "one sun for eight", &[many], |_| {});
     for (way, level) in [0.0, 0.2, 65504.0].into_iter().enumerate() {
@@ -203,7 +210,7 @@ fn meshes_of_one_triangle_and_lights_within_closed_ones() {
     // The camera inside, too: everything is seen from behind.
     let inside = (CAMERA, "[1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]");
     let edits = [(LAMP, "position = [0.0, 0.0, 0.0]"), inside];
-    one_way(3, "inside", &edits, |folder| folder.write("quad.glb", &closed));
+    under(3, true, "inside", &edits, |folder| folder.write("quad.glb", &closed));
 }
 
 /// A closed mesh about the origin, half a unit wide to each side.
