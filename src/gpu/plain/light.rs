@@ -2,16 +2,16 @@
 //! environment.
 
 use wgpu::{
-    AddressMode, BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
-    BindGroupLayoutEntry, BindingResource, BindingType, Buffer, BufferBindingType, BufferUsages, FilterMode,
-    MipmapFilterMode, SamplerBindingType, SamplerDescriptor, ShaderStages, TextureSampleType,
-    TextureViewDimension,
+    AddressMode, BindGroup, BindGroupLayout, BindingResource, BindingType, Buffer, BufferBindingType,
+    BufferUsages, FilterMode, MipmapFilterMode, SamplerBindingType, SamplerDescriptor, ShaderStages,
+    TextureSampleType, TextureViewDimension,
 };
 
 use super::text::{OWN_ROWS, Shining, rows_of};
 use crate::bake::harmonics::CONSTANT;
 use crate::bake::lobe_sky::LobeSky;
 use crate::bake::rays::RayMesh;
+use crate::compute;
 use crate::device::Gpu;
 use crate::error::GpuError;
 use crate::model::cube::Cube;
@@ -72,7 +72,7 @@ impl Light {
             ..SamplerDescriptor::default()
         });
         let layout = layout(gpu);
-        let resources = [
+        let resources = vec![
             reaching.as_entire_binding(),
             places.as_entire_binding(),
             lamps.as_entire_binding(),
@@ -80,15 +80,7 @@ impl Light {
             BindingResource::Sampler(&sampler),
             frame.as_entire_binding(),
         ];
-        let entries: Vec<_> = (0_u32..)
-            .zip(resources)
-            .map(|(binding, resource)| BindGroupEntry { binding, resource })
-            .collect();
-        let bound = gpu.device.create_bind_group(&BindGroupDescriptor {
-            label: Some("light on what is not skin"),
-            layout: &layout,
-            entries: &entries,
-        });
+        let bound = compute::bind(gpu, &layout, resources);
         let bytes = reaching.size() + places.size() + lamps.size() + sky.bytes.len() as u64;
         let has_sky = scene.environment.is_some();
         Ok(Self { layout, bound, triangles, spread, lights, has_sky, reaching, frame, brightness, bytes })
@@ -189,11 +181,7 @@ fn light_rows(lights: &[SceneLight]) -> Vec<[f32; 4]> {
 }
 
 fn layout(gpu: &Gpu) -> BindGroupLayout {
-    let storage = BindingType::Buffer {
-        ty: BufferBindingType::Storage { read_only: true },
-        has_dynamic_offset: false,
-        min_binding_size: None,
-    };
+    let storage = compute::storage(true);
     let frame = BindingType::Buffer {
         ty: BufferBindingType::Uniform,
         has_dynamic_offset: false,
@@ -204,21 +192,9 @@ fn layout(gpu: &Gpu) -> BindGroupLayout {
         view_dimension: TextureViewDimension::Cube,
         multisampled: false,
     };
-    let entries =
-        [storage, storage, storage, sky, BindingType::Sampler(SamplerBindingType::Filtering), frame];
-    let entries: Vec<_> = (0_u32..)
-        .zip(entries)
-        .map(|(binding, ty)| BindGroupLayoutEntry {
-            binding,
-            visibility: ShaderStages::FRAGMENT,
-            ty,
-            count: None,
-        })
-        .collect();
-    gpu.device.create_bind_group_layout(&BindGroupLayoutDescriptor {
-        label: Some("light on what is not skin"),
-        entries: &entries,
-    })
+    let sampler = BindingType::Sampler(SamplerBindingType::Filtering);
+    let kinds = [storage, storage, storage, sky, sampler, frame];
+    compute::layout(gpu, "light on what is not skin", &kinds.map(|kind| (ShaderStages::FRAGMENT, kind)))
 }
 
 #[cfg(test)]

@@ -4,12 +4,12 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use wgpu::{
-    AddressMode, BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
-    BindGroupLayoutEntry, BindingResource, BindingType, BufferBindingType, BufferUsages, FilterMode, Sampler,
-    SamplerBindingType, SamplerDescriptor, ShaderStages, TextureSampleType, TextureView,
+    AddressMode, BindGroup, BindGroupLayout, BindingResource, BindingType, BufferBindingType, BufferUsages,
+    FilterMode, Sampler, SamplerBindingType, SamplerDescriptor, ShaderStages, TextureSampleType, TextureView,
     TextureViewDimension,
 };
 
+use crate::compute;
 use crate::device::Gpu;
 use crate::error::GpuError;
 use crate::scene::maps::Map;
@@ -61,15 +61,7 @@ impl Materials {
                 [BindingResource::TextureView(view), BindingResource::Sampler(sampler)]
             });
             let resources = std::iter::once(numbers.as_entire_binding()).chain(maps);
-            let entries: Vec<_> = (0_u32..)
-                .zip(resources)
-                .map(|(binding, resource)| BindGroupEntry { binding, resource })
-                .collect();
-            bound.push(gpu.device.create_bind_group(&BindGroupDescriptor {
-                label: Some("material"),
-                layout: &layout,
-                entries: &entries,
-            }));
+            bound.push(compute::bind(gpu, &layout, resources.collect()));
         }
         Ok(Self { layout, bound, bytes: pictures.bytes })
     }
@@ -142,15 +134,5 @@ fn layout(gpu: &Gpu) -> BindGroupLayout {
     };
     let sampler = BindingType::Sampler(SamplerBindingType::Filtering);
     let kinds = [numbers, picture, sampler, picture, sampler, picture, sampler];
-    let entries: Vec<_> = (0_u32..)
-        .zip(kinds)
-        .map(|(binding, ty)| BindGroupLayoutEntry {
-            binding,
-            visibility: ShaderStages::FRAGMENT,
-            ty,
-            count: None,
-        })
-        .collect();
-    gpu.device
-        .create_bind_group_layout(&BindGroupLayoutDescriptor { label: Some("material"), entries: &entries })
+    compute::layout(gpu, "material", &kinds.map(|kind| (ShaderStages::FRAGMENT, kind)))
 }
