@@ -13,7 +13,7 @@ use crate::lab::{Lab, Result};
 use crate::studies::number;
 
 /// The tests that measure something that a page quotes.
-const TESTS: [&str; 8] = [
+const TESTS: [&str; 13] = [
     "bakes::",
     "samples::",
     "occlusion::",
@@ -22,6 +22,11 @@ const TESTS: [&str; 8] = [
     "lights::",
     "graphics::parity::",
     "graphics::fused::",
+    "silhouettes::",
+    "registration::",
+    "cameras::",
+    "imported::",
+    "panorama::",
 ];
 
 /// The least and the greatest of what each test measured, by name.

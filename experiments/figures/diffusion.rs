@@ -3,6 +3,7 @@
 use serde_json::{Map, Value, json};
 
 use crate::lab::{Choice, Lab, Result};
+use crate::light::RAYS;
 
 /// The scenes; the studio has lamps, and a view close up.
 const SCENES: [&str; 3] = ["forest", "sunrise", "studio"];
@@ -20,7 +21,7 @@ pub(crate) const OTHERS: &str = r#"["base_weight", "rim_weight", "rim_exponent",
 const LEVELS: &str = r#"["base_weight", "rim_weight", "rim_exponent", "specular_weight", "roughness", "gloss", "f0", "normal_strength", "diffusion_weight_1", "diffusion_weight_2", "diffusion_weight_3", "diffusion_radius_1", "diffusion_radius_2", "diffusion_radius_3"]"#;
 
 /// What is fitted: its row's name, and settings of the scene file.
-const CHOICES: [Choice; 8] = [
+const CHOICES: [Choice; 12] = [
     ("no scattering", &[("model.effects", WITHOUT), ("fit.free", OTHERS)]),
     ("`diffusion`", &[("model.effects", DIFFUSION), ("fit.free", LEVELS)]),
     ("`diffusion`, `transmission`", &[]),
@@ -32,7 +33,24 @@ const CHOICES: [Choice; 8] = [
         &[("diffusion", "{ unblurred = \"pixel\", light_map_size = 1024, ambient_normal = \"bumped\" }")],
     ),
     ("the same, `seams = \"joined\"`", &[("diffusion", "{ seams = \"joined\" }")]),
+    ("the same, `taps = \"full\"`", &[("diffusion", "{ taps = \"full\" }")]),
+    (
+        "no scattering, 16 lights, both by rays",
+        &[WITHOUT_RAYS[0], WITHOUT_RAYS[1], RAYS[0], RAYS[1], RAYS[2]],
+    ),
+    ("`diffusion`, `transmission`, 16 lights, both by rays", RAYS),
+    (
+        "the same, `unblurred = \"pixel\"`, `light_map_size = 1024`, `ambient_normal = \"bumped\"`",
+        &[
+            ("diffusion", "{ unblurred = \"pixel\", light_map_size = 1024, ambient_normal = \"bumped\" }"),
+            RAYS[0],
+            RAYS[1],
+            RAYS[2],
+        ],
+    ),
 ];
+
+const WITHOUT_RAYS: [(&str, &str); 2] = [("model.effects", WITHOUT), ("fit.free", OTHERS)];
 
 /// All of them, as docs/results.md has them in a table.
 pub(crate) fn measure(lab: &Lab) -> Result<Value> {

@@ -33,7 +33,8 @@ const CHOICES: [Choice; 15] = [
     ("16 lights, both by rays, `anisotropic`", &[RAYS[0], RAYS[1], RAYS[2], ANISOTROPIC]),
 ];
 
-const RAYS: &[(&str, &str)] = &[
+/// Reference choices.
+pub(crate) const RAYS: &[(&str, &str)] = &[
     ("environment.lights", "16"),
     ("model.visibility", "\"rays\""),
     ("model.specular_visibility", "\"rays\""),

@@ -320,6 +320,7 @@ fn check(views: &[ImportedView]) {
             let [x, y] = opencv(point, numbers, distortion);
             let (px, py, depth) = view.camera.project(pose().inverse().transform_point3(point));
             // Roundings of f64 in numbers up to 1000; 0.05 pixels are asked for.
+            crate::figures::measured("imported projection", (px - x).hypot(py - y));
             assert!((px - x).hypot(py - y) < 1e-9, "{model}: {px} {py}, not {x} {y}");
             assert!((depth - point.z).abs() < 1e-12);
         }
@@ -407,6 +408,7 @@ fn transforms_project_as_their_axes_have_it() {
         for point in points() {
             let [x, y] = opencv(point, case.2, case.3);
             let (px, py, _) = view.camera.project(pose().inverse().transform_point3(point));
+            crate::figures::measured("imported projection", (px - x).hypot(py - y));
             assert!((px - x).hypot(py - y) < 1e-9, "{px} {py}, not {x} {y}");
         }
     }

@@ -17,6 +17,7 @@ mod joint;
 mod joint_studies;
 mod lit;
 mod maps;
+mod moved_cameras;
 mod outputs;
 mod own_head;
 mod page;

@@ -1,7 +1,7 @@
 //! Arbitrary scene files and damaged bytes are thrown at the readers: nothing panics.
 //!
 //! - [`tree`]: damage to what a file says; [`tables`]: constants, plans, results, cases; [`meshes`]: buffers beside a
-//!   glTF file, morph targets, animations, cameras, masks; [`cameras`]: what other programs say of theirs, responses
+//!   glTF file, morph targets, animations, cameras, masks; [`materials`]: what parts are drawn by; [`cameras`]: what other programs say of theirs, responses
 //!
 //! What the program makes of damaged files, and what it leaves behind, is in `cli::damaged`; states of fits are in
 //! `fits::damaged`.
@@ -9,6 +9,7 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests may stop where the tests themselves would")]
 
 mod cameras;
+mod materials;
 mod meshes;
 mod tables;
 pub(crate) mod tree;

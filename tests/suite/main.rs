@@ -39,6 +39,7 @@ mod harmonics;
 mod imported;
 mod instructions;
 mod joint;
+mod lenient;
 mod light_files;
 mod lights;
 mod lit;

@@ -94,6 +94,9 @@ fn cameras_of_the_built_in_scene_are_found_again() {
     for ([truth, before, after], moved) in cameras.iter().zip(&baked.cameras) {
         let (start, end) = (apart(&baked, truth, before), apart(&baked, truth, after));
         println!("{}: {start:?} -> {end:?}, settled: {}", moved.view, moved.settled);
+        let of = if moved.view == "profile" { "profile" } else { "others" };
+        crate::figures::measured(&format!("registration {of} start"), start[0]);
+        crate::figures::measured(&format!("registration {of} end"), end[0]);
         // A tenth of a pixel, from some five; but a profile is turned about its vertical axis without a change of its
         // silhouette, and of the built-in head's smooth cheek little but shading tells.
         let bounds = if moved.view == "profile" { [0.25, 2.5] } else { [0.1, 0.3] };
@@ -127,6 +130,8 @@ fn cameras_of_path_traced_heads_end_at_the_same_place_from_anywhere_near() {
     // Nearly the same optimum from both, a tenth of a pixel from the truth, though the paper's model at its default constants
     // does not light the head as the path tracer does: what is finer than its light tells where it is.
     let found = apart(&baked, &there[0], &there[2]);
+    crate::figures::measured("registration traced start", start[0]);
+    crate::figures::measured("registration traced end", found[0]);
     assert!(start[0] > 2.0 && end[0] < 0.2, "{start:?} -> {end:?}");
     assert!(bias[0] < 0.1 && found[0] < 0.1, "{bias:?} {found:?}");
 }

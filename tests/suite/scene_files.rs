@@ -14,7 +14,7 @@ use skinfit::scene::{LoadOptions, Loss, Scene};
 
 use super::common;
 use super::fixtures::{bare_scene, camera};
-use super::scene_folder::{SCENE, SceneFolder, base64, encode, exr, png, quad, quad_parts, tampered};
+use super::scene_folder::{SCENE, SceneFolder, base64, encode, exr, glb, png, quad, quad_parts, tampered};
 
 #[test]
 fn the_small_scene_is_read_as_it_stands() {
@@ -539,4 +539,37 @@ fn gltf_with_data_uris_and_files_beside_it_reads_as_the_glb_does() {
         scene_folder.write("quad.glb", json.to_string().as_bytes());
         assert_eq!(scene_folder.load().unwrap().0.mesh, want, "{uri}");
     }
+}
+
+#[test]
+fn the_atlas_is_of_the_texture_coordinates_that_the_scene_names() {
+    let folder = SceneFolder::new();
+    let (mut json, bin) = quad_parts();
+    let first = json["accessors"].as_array().unwrap().len();
+    // The quad's corners in x and y are no places in an atlas, but other numbers.
+    let corners = json!({"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC2"});
+    json["accessors"].as_array_mut().unwrap().push(corners);
+    let attributes = &mut json["meshes"][0]["primitives"][0]["attributes"];
+    attributes["TEXCOORD_1"] = attributes["TEXCOORD_0"].take();
+    attributes["TEXCOORD_0"] = json!(first);
+    folder.write("quad.glb", &glb(&json, &bin));
+    let scene = |maps: &str, set: &str| {
+        let start = SCENE.find("[maps]").unwrap();
+        let end = SCENE.find("[environment]").unwrap();
+        let text = format!("{}{maps}{}", &SCENE[..start], &SCENE[end..]);
+        let text = text.replace("[model]\n", "[model]\neffects = [\"diffuse\", \"diffusion\"]\n");
+        folder.write("scene.toml", format!("{text}[diffusion]\n{set}\n").as_bytes());
+        folder.load()
+    };
+    let uvs = |set: &str| scene("", set).unwrap().0.mesh.uvs[1].to_array();
+    assert_eq!(uvs("uv_set = 1"), [1.0, 1.0]);
+    assert_eq!(uvs("uv_set = 0"), [0.0, 1.0]);
+    assert_eq!(uvs(""), [0.0, 1.0]);
+    let maps = "[maps]\ncolor = \"color.png\"\n";
+    assert!(scene(maps, "uv_set = 0").is_ok());
+    let told = scene(maps, "uv_set = 1").unwrap_err().to_string();
+    assert!(told.contains("uv_set = 1") && told.contains("texture coordinates 0"), "{told}");
+    assert!(scene("", "uv_set = 16").is_err());
+    // What the mesh does not have.
+    assert!(scene("", "uv_set = 2").is_err());
 }

@@ -111,6 +111,7 @@ fn wrong_fields_of_view_are_noticed_and_the_right_one_is_named() {
             let told = with(|scene| scene.views[i].camera.fov_y *= factor);
             assert_eq!(told.len(), 1, "{told:#?}");
             let named = number_after(&told[0], "with fov_y_degrees = ");
+            crate::figures::measured("silhouettes field of view", (named / fov.to_degrees() - 1.0).abs());
             // A tenth of a pixel at a silhouette some hundred pixels from the centre is 0.1%; twice that.
             assert!((named / fov.to_degrees() - 1.0).abs() < 2e-3, "{named}, not {}", fov.to_degrees());
         }
@@ -151,6 +152,65 @@ fn other_poses_are_noticed() {
             camera.world_to_camera *= DMat4::from_rotation_y(angle.to_radians());
         });
         assert_eq!(told.len(), 1, "{told:#?}");
+    }
+}
+
+/// A scene of path-traced targets, its silhouettes' effects, and what is said with a mistake in it.
+fn traced(scene: &str, effects: &[Effect], mistake: impl FnOnce(&mut Scene)) -> Option<Vec<String>> {
+    let mut loaded = read(&common::data()?.join(scene), effects);
+    mistake(&mut loaded.scene);
+    Some(said(loaded))
+}
+
+#[test]
+fn mistakes_are_noticed_on_path_traced_heads() {
+    let forest = |mistake: &dyn Fn(&mut Scene)| traced("lps_forest/scene.toml", &[], mistake);
+    for (a, b) in [(0, 1), (1, 2), (0, 2)] {
+        let Some(told) = forest(&|scene| {
+            let targets = [a, b].map(|i: usize| scene.views[i].target.take());
+            let [first, second] = targets;
+            (scene.views[a].target, scene.views[b].target) = (second, first);
+        }) else {
+            return;
+        };
+        assert_eq!(told.len(), 2, "{told:#?}");
+        assert!(told.iter().all(|told| told.contains("swapped")), "{told:#?}");
+    }
+    for i in 0..3 {
+        for factor in [0.95, 1.05] {
+            let mut fov = 0.0;
+            let told = forest(&|scene| scene.views[i].camera.fov_y *= factor).unwrap();
+            traced("lps_forest/scene.toml", &[], |scene| fov = scene.views[i].camera.fov_y.to_degrees());
+            assert_eq!(told.len(), 1, "{i} {factor}: {told:#?}");
+            let named = number_after(&told[0], "with fov_y_degrees = ");
+            crate::figures::measured("silhouettes traced field of view", (named / fov - 1.0).abs());
+            // As of the built-in scene; edges of path-traced targets are of some tens of samples a pixel.
+            assert!((named / fov - 1.0).abs() < 5e-3, "{named}, not {fov}");
+        }
+    }
+    // A scanned head has no symmetry: its mirror image fits nowhere, its front's neither.
+    for i in 0..3 {
+        let told = forest(&|scene| {
+            let width = scene.views[i].camera.width as usize;
+            reordered(scene.views[i].target.as_mut().unwrap(), width, |x, y| y * width + width - 1 - x);
+        })
+        .unwrap();
+        assert_eq!(told.len(), 1, "{i}: {told:#?}");
+    }
+}
+
+#[test]
+fn other_moments_of_an_animation_are_noticed() {
+    let Some(data) = common::data() else { return };
+    for time in [0.0, 1.0, 1.5] {
+        let options = PrepareOptions {
+            effects: Some(Effects::of(&[Effect::Skin, Effect::Morph])),
+            fit: true,
+            time: Some(time),
+            ..PrepareOptions::default()
+        };
+        let told = said(Loaded::read(&data.join("mh_portrait/scene.toml"), &options).unwrap());
+        assert!(!told.is_empty(), "at {time} s");
     }
 }
 

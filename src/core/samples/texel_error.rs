@@ -13,8 +13,9 @@ pub enum AtlasError {
     NoUvs,
     /// A tiled mesh: several places would share a texel.
     #[error(
-        "texture coordinates lie in the tile ({u}, {v}), but effects that are computed in the UV atlas need all of \
-         them in the unit square. Lay the mesh out there, or leave those effects out."
+        "texture coordinates lie in the tile ({u}, {v}){}, but effects that are computed in the UV atlas need all of \
+         them in the unit square: UDIMs are not read. Lay the mesh out there, or leave those effects out.",
+        udim(*u, *v)
     )]
     Outside {
         /// The tile's column.
@@ -41,4 +42,10 @@ pub enum AtlasError {
     /// The effects cannot be computed.
     #[error(transparent)]
     Shading(#[from] ShadingError),
+}
+
+/// A tile's number among UDIMs, of which ten stand in a row, where it has one.
+fn udim(u: f32, v: f32) -> String {
+    let named = (0.0..10.0).contains(&u) && (0.0..900.0).contains(&v);
+    if named { format!(", which is UDIM {}", 1001.0 + u + 10.0 * v) } else { String::new() }
 }

@@ -5,6 +5,8 @@ use toml::Spanned;
 use super::Scene;
 use super::error::SceneError;
 use super::file::{DiffusionTable, Source, TapsValue};
+use super::gltf::TextureUv;
+use super::maps::Maps;
 use super::numbers::whole;
 use crate::model::diffusion::{
     AmbientNormal, Combined, DiffusionChoices, Lookup, Method, Seams, Stretch, Taps, Unblurred,
@@ -86,6 +88,32 @@ const HUMAN_HEAD: [(f64, [f64; 3]); 6] = [
     (1.99, [0.358, 0.004, 0.0]),
     (7.41, [0.078, 0.0, 0.0]),
 ];
+
+/// The texture coordinates by which the mesh lies in the atlas: those of the maps, or the set that the table names where
+/// nothing is looked up by others.
+pub(super) fn atlas_uv(
+    source: &Source,
+    table: &DiffusionTable,
+    maps: &Maps,
+    of_maps: TextureUv,
+) -> Result<TextureUv, SceneError> {
+    let Some(given) = &table.uv_set else { return Ok(of_maps) };
+    let set = whole(source, Some(given), "uv_set", [0, 15], 0)?;
+    if set == of_maps.set {
+        return Ok(of_maps);
+    }
+    let Maps { color, normal, specular, attenuator, own, .. } = maps;
+    let looked_up = color.is_some() || normal.is_some() || specular.is_some() || attenuator.is_some();
+    if looked_up || !own.is_empty() {
+        let what = format!(
+            "uv_set = {set}, but the maps are looked up by texture coordinates {}, and a mesh has one set of them here",
+            of_maps.set
+        );
+        let remedy = "Lay the maps out by the set that does not overlap, or leave the maps out";
+        return Err(source.error(given, what, remedy));
+    }
+    Ok(TextureUv::of_set(set))
+}
 
 /// The table over the defaults: what is made, and by which choices.
 pub(super) fn read(

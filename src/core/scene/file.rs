@@ -208,6 +208,7 @@ pub(super) struct BloomTable {
 #[derive(Clone, Debug, Default, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct DiffusionTable {
+    pub uv_set: Option<Spanned<i64>>,
     pub light_map_size: Option<Spanned<i64>>,
     pub preset: Option<Spanned<String>>,
     pub method: Option<Spanned<String>>,

@@ -138,6 +138,9 @@ impl Scene {
             maps.normal = maps.normal.or(normal);
             uv = of_material.uv();
         }
+        if needs.atlas {
+            uv = diffusion::atlas_uv(&source, &file.diffusion, &maps, uv)?;
+        }
         if choices.normal_filter == NormalFilter::Toksvig {
             maps.normalise_normals();
         }

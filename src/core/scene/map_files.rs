@@ -53,14 +53,30 @@ pub(super) fn read_maps(
         (specular, ..) => specular,
     };
     let own = read_own_maps(source, maps, folder, (needs, declared), warnings)?;
-    Ok(Maps {
-        color,
-        normal: normals.filter(|_| normal.is_some()),
-        specular,
-        attenuator,
-        own,
-        material: None,
-    })
+    let normals = normal.zip(normals).map(|(path, normals)| {
+        warn_of_other_than_normals(&path, &normals, warnings);
+        normals
+    });
+    Ok(Maps { color, normal: normals, specular, attenuator, own, material: None })
+}
+
+/// Tells of a normal map that looks like another picture, a photograph say.
+pub(super) fn warn_of_other_than_normals(path: &Path, map: &Map<3>, warnings: &mut Warnings) {
+    // Filtered, compressed and worn maps have some texels that are far from unit vectors, not a quarter of them.
+    const MOST: f64 = 0.25;
+    let is_normal = |texel: &&[f32; 3]| {
+        let [x, y, z] = texel.map(|x| 2.0 * x - 1.0);
+        z > 0.0 && (0.7..1.3).contains(&(x * x + y * y + z * z).sqrt())
+    };
+    let others = 1.0 - map.texels.iter().filter(is_normal).count() as f64 / map.texels.len() as f64;
+    if others > MOST {
+        let message = format!(
+            "does not look like a normal map: {:.0}% of its texels are far from unit vectors that point out of the \
+             surface. Name a tangent-space map as `normal` in [maps]",
+            100.0 * others
+        );
+        warn(warnings, path, message);
+    }
 }
 
 /// The maps of fields that the scene's terms have `declared`, those alone that the enabled effects ask for.

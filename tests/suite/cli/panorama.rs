@@ -55,6 +55,9 @@ fn brackets_are_merged_to_the_radiance_that_they_are_of() {
     assert!(errors.len() > 100_000, "{}", errors.len());
     errors.sort_by(f64::total_cmp);
     // Noise of the sensor and 8 bits: 2% are asked for in the middle.
+    for (name, share) in [("median", 0.5), ("most", 0.95)] {
+        crate::figures::measured(&format!("merged {name}"), quantile(&errors, share));
+    }
     assert!(quantile(&errors, 0.5) < 0.02, "{}", quantile(&errors, 0.5));
 }
 
@@ -263,6 +266,7 @@ fn constants_fitted_under_stitched_light_are_those_under_the_true_one() {
     let truth = rendered::truth(&world, 1024);
     sandbox.write_exr("true.exr", 1024, 512, |x, y| truth.texels[y * 1024 + x]);
     let (size, signed) = rendered::error(&picture(&sandbox.path("stitched.exr")), &truth, |_| true);
+    crate::figures::measured("stitched radiance", size);
     // As the stitch's own tests have it.
     assert!(size < 0.01, "{size} {signed}");
     let fitted = |light: &str| {
@@ -281,6 +285,7 @@ fn constants_fitted_under_stitched_light_are_those_under_the_true_one() {
     assert_eq!(got.len(), want.len());
     for ((name, want), (_, got)) in want.iter().zip(&got) {
         println!("{name}: {want} under the true light, {got} under the stitched one");
+        crate::figures::measured("stitched constants", (got / want - 1.0).abs());
         // What the radiance is held to.
         assert!((got - want).abs() <= 0.01 * want.abs(), "{name}: {got} for {want}");
     }

@@ -288,6 +288,7 @@ fn ways_to_the_skys_light_are_measured_beside_rays() {
     let ways = [
         ("visibility", "rays", "sh4"),
         ("specular_visibility", "rays", "lagarde"),
+        ("specular_model", "ggx", "kelemen"),
         ("lobe_lookup", "rays", "mirror"),
         ("skin_reflection", "rays", "gathered"),
         ("bounces", "gathered", "gathered"),

@@ -16,6 +16,7 @@ fn points() -> impl Iterator<Item = DVec3> {
 
 fn near([x, y]: [f64; 2], [wx, wy]: [f64; 2], what: &str) {
     // Roundings of f64 in numbers up to some thousands.
+    crate::figures::measured("imported projection", (x - wx).hypot(y - wy));
     assert!((x - wx).hypot(y - wy) < 1e-9, "{what}: {x} {y}, not {wx} {wy}");
 }
 

@@ -17,7 +17,7 @@ use crate::common;
 use crate::graphics::bench::cache;
 use crate::scene_folder::{SceneFolder, exr, glb, png, quad_parts};
 
-const SCENE: &str = r#"
+pub(crate) const SCENE: &str = r#"
 [mesh]
 file = "quad.glb"
 skin = ["Skin"]
@@ -43,7 +43,11 @@ fn folder(material: &Value, scene: &str) -> SceneFolder {
 }
 
 /// The same with another glTF file, before it is written.
-fn edited(material: &Value, scene: &str, edit: impl FnOnce(&mut Value, &mut Vec<u8>)) -> SceneFolder {
+pub(crate) fn edited(
+    material: &Value,
+    scene: &str,
+    edit: impl FnOnce(&mut Value, &mut Vec<u8>),
+) -> SceneFolder {
     let folder = SceneFolder::new();
     let (mut mesh, mut bin) = quad_parts();
     mesh["nodes"] = json!([{"mesh": 0}, {"mesh": 1, "scale": [0.5, 0.5, 0.5], "translation": [0, 0, 0.5]}]);

@@ -1,7 +1,5 @@
 //! What a file holds, by its own names: for people who have not seen it yet.
 
-use std::collections::BTreeMap;
-
 use gltf::json;
 use json::animation::Property;
 use json::material::AlphaMode;
@@ -11,10 +9,7 @@ use json::validation::Checked;
 use super::document::Document;
 use super::textures::TextureUse;
 use crate::scene::error::SceneError;
-use crate::scene::inspect::{Animation, FilePicture, Material, MeshPart, Picture, UnreadExtension};
-
-/// Extensions whose numbers are read.
-const READ: [&str; 3] = ["KHR_mesh_quantization", "KHR_lights_punctual", "KHR_texture_transform"];
+use crate::scene::inspect::{Animation, FilePicture, Material, MeshPart, Picture};
 
 impl Document {
     /// The program that wrote the file, where it says.
@@ -163,15 +158,5 @@ impl Document {
             });
         }
         Ok(animations)
-    }
-
-    /// The extensions that the file uses and that are not read, each once.
-    pub(in crate::scene) fn unread_extensions(&self) -> Vec<UnreadExtension> {
-        let required = &self.root.extensions_required;
-        let used = self.root.extensions_used.iter().chain(required);
-        let names = used.filter(|name| !READ.contains(&name.as_str()));
-        let by_name: BTreeMap<&String, bool> =
-            names.map(|name| (name, required.iter().any(|other| other == name))).collect();
-        by_name.into_iter().map(|(name, required)| UnreadExtension { name: name.clone(), required }).collect()
     }
 }

@@ -1,19 +1,18 @@
 //! A glTF file: its JSON, its buffers, and lookups by index that refuse what is out of range.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use base64::Engine;
 use gltf::json;
 use json::Index;
+use percent_encoding::percent_decode_str;
 
+use super::{container, parse};
 use crate::scene::error::{SceneError, guarded, read_bytes};
 
 /// No mesh file or buffer above this many bytes is read.
 pub(super) const MOST_BYTES: u64 = 1 << 32;
-
-/// Required extensions that change nothing that is read here, or that the accessors cover.
-const HARMLESS: [&str; 5] =
-    ["KHR_mesh_quantization", "KHR_lights_punctual", "KHR_xmp_json_ld", "KHR_materials_", "KHR_texture_"];
 
 /// A parsed glTF file and the bytes that it refers to.
 pub(in crate::scene) struct Document {
@@ -28,34 +27,19 @@ impl Document {
     /// Read and parse a .glb or .gltf file with all of its buffers; images are not read.
     pub(in crate::scene) fn open(path: &Path) -> Result<Self, SceneError> {
         let bytes = read_bytes(path, MOST_BYTES)?;
-        let parsed = guarded(path, || {
-            gltf::Gltf::from_slice_without_validation(&bytes).map_err(|e| {
-                let reason = e.to_string().replace('\n', " ");
-                SceneError::new(
-                    path,
-                    format!("cannot be read as glTF 2.0: {reason}"),
-                    "The file is cut short, damaged or of another kind: export it anew as .glb",
-                )
-            })
-        })?;
-        let blob = parsed.blob;
-        let root = parsed.document.into_json();
+        let refused = |reason: String| {
+            SceneError::new(
+                path,
+                format!("cannot be read as glTF 2.0: {}", reason.replace('\n', " ")),
+                "The file is cut short, damaged or of another kind: export it anew as .glb",
+            )
+        };
+        let (text, blob) = container::contents(&bytes).map_err(refused)?;
+        let root = guarded(path, || parse::root(text).map_err(|e| refused(e.to_string())))?;
         let mut document = Self { path: path.to_owned(), root, buffers: Vec::new(), clip: 0 };
         document.check_extensions()?;
-        document.load_buffers(blob)?;
+        document.load_buffers(blob.map(<[u8]>::to_vec))?;
         Ok(document)
-    }
-
-    fn check_extensions(&self) -> Result<(), SceneError> {
-        for name in &self.root.extensions_required {
-            if !HARMLESS.iter().any(|known| name.starts_with(known)) {
-                return Err(self.error(
-                    format!("requires the extension {name}, which is not read"),
-                    "Export it without (uncompressed)",
-                ));
-            }
-        }
-        Ok(())
     }
 
     fn load_buffers(&mut self, mut blob: Option<Vec<u8>>) -> Result<(), SceneError> {
@@ -83,8 +67,9 @@ impl Document {
         let at = |error: SceneError| error.at(place);
         if let Some(data) = uri.strip_prefix("data:") {
             let (head, body) = data.split_once(',').unwrap_or((data, ""));
+            let body: Cow<'_, [u8]> = percent_decode_str(body).into();
             if !head.ends_with(";base64") {
-                return Err(at(self.error("has a data URI that is not base64", "Export it as .glb")));
+                return Ok(body.into_owned());
             }
             let engine = &base64::engine::GeneralPurpose::new(
                 &base64::alphabet::STANDARD,
@@ -92,13 +77,13 @@ impl Document {
                     .with_decode_padding_mode(base64::engine::DecodePaddingMode::Indifferent),
             );
             return engine
-                .decode(body.trim())
+                .decode(body.trim_ascii())
                 .map_err(|e| at(self.error(format!("has a damaged data URI: {e}"), "Export it anew")));
         }
         if uri.contains("://") {
             return Err(at(self.error(format!("is at {uri}, which is not fetched"), "Export it as .glb")));
         }
-        let decoded = percent_encoding::percent_decode_str(uri).decode_utf8_lossy();
+        let decoded = percent_decode_str(uri).decode_utf8_lossy();
         let folder = self.path.parent().unwrap_or(Path::new(""));
         read_bytes(&folder.join(decoded.as_ref()), MOST_BYTES)
     }

@@ -1,6 +1,7 @@
 //! glTF 2.0 files (.glb and .gltf) as one mesh.
 //!
-//! - [`document`]: the JSON, its buffers, and checked lookups of everything by index
+//! - [`container`]: the binary container; [`parse`]: the JSON; [`extensions`]: which are read
+//! - [`document`]: these, its buffers, and checked lookups of everything by index
 //! - [`accessor`]: typed arrays out of the buffers
 //! - [`nodes`]: the node tree, posed by an [`animation`] at a time
 //! - [`cameras`]: the cameras of its nodes
@@ -10,8 +11,7 @@
 //! - [`plain`]: which triangles are skin, and the materials of the others
 //! - [`skins`]: bones and their influences
 //! - [`skin_maps`]: the maps of the skin's own material
-//! - [`places`]: which of the mesh's vertices a primitive's are; [`streams`]: the file with numbers of these added, in a
-//!   [`container`]
+//! - [`places`]: which of the mesh's vertices a primitive's are; [`streams`]: the file with numbers of these added
 //! - [`textures`]: what a material says of a texture
 //! - [`assemble`]: every primitive of the scene in one [`Mesh`](super::mesh::Mesh)
 //!
@@ -25,8 +25,10 @@ mod cameras;
 mod container;
 mod contents;
 mod document;
+mod extensions;
 mod lights;
 mod nodes;
+mod parse;
 mod places;
 mod plain;
 mod primitive;

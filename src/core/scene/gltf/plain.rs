@@ -129,6 +129,7 @@ impl Document {
         let Some(index) = index else { return Ok((gltf_default(), TextureUv::default())) };
         let material = self.get(&self.root.materials, Index::new(index as u32), "material")?;
         let name = self.material_name(index);
+        self.warn_of_unread(&name, material, warnings);
         let surface = &material.pbr_metallic_roughness;
         let textures = [
             (&surface.base_color_texture, true),
@@ -148,10 +149,17 @@ impl Document {
         for (map, texture) in maps.iter_mut().zip(uses) {
             if let Some((texture, color)) = texture {
                 *map = self.map_of(texture, color, pictures)?;
+                if map.is_none() {
+                    let message =
+                        format!("material {name:?} is drawn without a picture whose format is not read");
+                    warn(warnings, &self.path, message);
+                }
             }
         }
         let [color_map, roughness_map, emission_map] = maps;
         let sound = |x: f32| if x.is_finite() { x } else { 0.0 };
+        let strength = material.extensions.as_ref().and_then(|all| all.emissive_strength.as_ref());
+        let strength = strength.map_or(1.0, |strength| sound(strength.emissive_strength.0));
         let plain = PlainMaterial {
             base_color: surface.base_color_factor.0.map(sound),
             color_map,
@@ -165,7 +173,7 @@ impl Document {
                 Checked::Valid(AlphaMode::Blend) => Alpha::Blend,
                 _ => Alpha::Opaque,
             },
-            emission: material.emissive_factor.0.map(|x| sound(x).max(0.0)),
+            emission: material.emissive_factor.0.map(|x| (strength * sound(x)).max(0.0)),
             emission_map,
             name,
         };

@@ -7,6 +7,7 @@ use gltf::json;
 use super::document::Document;
 use super::textures::{Pictures, TextureUse, TextureUv};
 use crate::scene::error::{SceneError, Warnings, warn};
+use crate::scene::map_files::warn_of_other_than_normals;
 use crate::scene::maps::Map;
 use crate::scene::plain::{PlainMap, Wrap};
 
@@ -83,7 +84,7 @@ impl Document {
         }
         let mut found: Vec<(usize, SkinMaps)> = Vec::new();
         for (index, count) in triangles.into_iter().filter(|(_, count)| *count > 0) {
-            match self.maps_of_material(index, wanted) {
+            match self.maps_of_material(index, wanted, warnings) {
                 Ok(maps) => found.extend(maps.map(|maps| (count, maps))),
                 Err(error) => warn(warnings, &self.path, without(&self.material_name(index), error)),
             }
@@ -124,14 +125,20 @@ impl Document {
         &self,
         index: usize,
         (color, normal): (bool, bool),
+        warnings: &mut Warnings,
     ) -> Result<Option<SkinMaps>, SceneError> {
         let material = self.get(&self.root.materials, json::Index::new(index as u32), "material")?;
         let surface = &material.pbr_metallic_roughness;
         let [r, g, b, _] = surface.base_color_factor.0;
         let sound = |x: f32| if x.is_finite() { x.max(0.0) } else { 1.0 };
-        let shown = |texture: Option<TextureUse>| match texture {
-            Some(texture) => Ok(self.picture(texture)?.map(|_| texture)),
-            None => Ok(None),
+        let mut shown = |texture: Option<TextureUse>| {
+            let Some(texture) = texture else { return Ok(None) };
+            let picture = self.picture(texture)?;
+            if picture.is_none() {
+                let why = "a picture's format is not read";
+                warn(warnings, &self.path, without(&self.material_name(index), why));
+            }
+            Ok::<_, SceneError>(picture.map(|_| texture))
         };
         let color = shown(surface.base_color_texture.as_ref().filter(|_| color).map(TextureUse::of))?;
         let normal = shown(material.normal_texture.as_ref().filter(|_| normal).map(TextureUse::of_normals))?;
@@ -171,6 +178,9 @@ impl Document {
         };
         let colors = maps.color.filter(|_| color).and_then(|(texture, factor)| read(texture, true, factor));
         let normals = maps.normal.filter(|_| normal).and_then(|texture| read(texture, false, [1.0; 3]));
+        if let Some(map) = &normals {
+            warn_of_other_than_normals(&self.path, map, warnings);
+        }
         (colors, normals)
     }
 }

@@ -7,8 +7,9 @@ use std::collections::BTreeMap;
 
 use serde_json::{Map, Value, json};
 
-use super::container::container;
+use super::container::{container, contents};
 use super::document::{Document, MOST_BYTES};
+use super::parse;
 use super::places::Place;
 use crate::scene::error::{SceneError, guarded, read_bytes};
 use crate::scene::streams::VertexStream;
@@ -52,13 +53,10 @@ impl Document {
     /// The file's JSON, whatever else than what is read here it may hold.
     fn raw(&self) -> Result<Value, SceneError> {
         let bytes = read_bytes(&self.path, MOST_BYTES)?;
-        let text = match gltf::Glb::from_slice(&bytes) {
-            Ok(glb) => glb.json.into_owned(),
-            Err(_) => bytes,
-        };
         let damaged =
-            |e: serde_json::Error| self.error(format!("cannot be read: {e}"), "Export it anew as .glb");
-        serde_json::from_slice(&text).map_err(damaged)
+            |reason: String| self.error(format!("cannot be read: {reason}"), "Export it anew as .glb");
+        let (text, _) = contents(&bytes).map_err(damaged)?;
+        parse::value(text).map_err(|e| damaged(e.to_string()))
     }
 }
 

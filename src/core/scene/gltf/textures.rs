@@ -36,6 +36,11 @@ impl Default for TextureUv {
 }
 
 impl TextureUv {
+    /// A set as it stands.
+    pub(in crate::scene) fn of_set(set: u32) -> Self {
+        Self { set, ..Self::default() }
+    }
+
     /// Of a texture's own set and its extensions. What is no finite number is left as it stands without it.
     fn new(set: u32, extensions: Option<&Object<String, Value>>) -> Self {
         let Some(transform) = extensions.and_then(|all| all.get("KHR_texture_transform")) else {

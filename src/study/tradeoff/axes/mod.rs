@@ -35,6 +35,7 @@ pub fn all() -> Vec<&'static dyn Axis> {
         &sky_lights::SkyLights,
         &ways::SKY,
         &ways::LOBE,
+        &ways::MODEL,
         &ways::SPLIT_SUM,
         &ways::LOOKUP,
         &ways::NORMALS,

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use crate::StudyError;
 use crate::model::choices::{
-    Bounces, LobeLookup, NormalFilter, SkinReflection, SpecularVisibility, SplitSum, Visibility,
+    Bounces, LobeLookup, NormalFilter, SkinReflection, SpecularModel, SpecularVisibility, SplitSum,
+    Visibility,
 };
 use crate::model::effects::Effect;
 use crate::model::texture_filter::TextureFilter;
@@ -61,6 +62,20 @@ pub(super) const LOBE: Ways = Ways {
         ("cone", |scene| scene.choices.specular_visibility = SpecularVisibility::Cone),
         ("lobe", |scene| scene.choices.specular_visibility = SpecularVisibility::Lobe),
         ("rays", |scene| scene.choices.specular_visibility = SpecularVisibility::Rays),
+    ],
+};
+
+/// The specular BRDF.
+pub(super) const MODEL: Ways = Ways {
+    axis: "specular_model",
+    title: "The specular BRDF",
+    method: "Images with each BRDF at the same roughness, in the lobe and in the lights' highlights; ggx, which masks and shadows \
+             facets, is the reference. Seconds are those of baking, tracing and one pass, nothing cached.",
+    effect: "fresnel",
+    idle: "the effect fresnel is off",
+    ways: &[
+        ("kelemen", |scene| scene.choices.specular_model = SpecularModel::Kelemen),
+        ("ggx", |scene| scene.choices.specular_model = SpecularModel::Ggx),
     ],
 };
 
