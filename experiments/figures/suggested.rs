@@ -33,18 +33,26 @@ pub(crate) fn measure(lab: &Lab) -> Result<Value> {
     Ok(raw)
 }
 
-/// A step's row: what was added or taken out, or all of the first set; its score, what it gained, and what a pass takes.
+/// A step's row: what was added or taken out, or all of the first set; its score, what it gained, what a pass and a
+/// frame take in times of the first set's, and what is baked.
 fn row(sets: &[Value], steps: &[Value], at: usize, step: &Value) -> Value {
     let set =
         |step: &Value| step["set"].as_u64().and_then(|set| sets.get(set as usize)).unwrap_or(&Value::Null);
     let scored = |step: &Value| number(&set(step)["held_out"]);
     let effects: Vec<&str> = listed(&set(step)["effects"]).iter().filter_map(Value::as_str).collect();
-    let gain = at.checked_sub(1).map(|before| scored(step) - scored(&steps[before]));
+    let before = at.checked_sub(1).map(|before| &steps[before]);
+    let gain = before.map(|before| scored(step) - scored(before));
+    // What has to be baked beside what the set before has.
+    let had = before.map_or(&[][..], |before| listed(&before["counts"]["bakes"]));
+    let bakes = listed(&step["counts"]["bakes"]).iter().filter(|bake| !had.contains(bake));
+    let bakes: Vec<&str> = bakes.filter_map(Value::as_str).collect();
     json!({
         "name": if at == 0 { effects.join(", ").into() } else { step["what"].clone() },
         "psnr": scored(step),
         "gain": gain,
         "pass": step["cpu"]["ratio"]["median"],
+        "frame": step["gpu"]["ratio"]["median"],
+        "bakes": bakes.join(", "),
         "operations": set(step)["operations"],
     })
 }
