@@ -1,6 +1,7 @@
 //! Hard cases of light that scatters within the skin and of light that comes through it (MODEL 6, 7 and 11): what must hold of
 //! image, loss and slopes, which are finite in the f64 reference, on both engines, in the renderer and on tensors.
 
+use serde_json::json;
 use skinfit::engine::cpu::CpuEngine;
 use skinfit::engine::gpu::{GpuEngine, Memory};
 use skinfit::engine::reference::Reference;
@@ -15,7 +16,7 @@ use skinfit::render::shading::Shading;
 use crate::graphics::bench::{EXACT, gpu, on_gpu};
 use crate::hard_lights::octahedron;
 use crate::lit::{baked, image, param, quad};
-use crate::scene_folder::SceneFolder;
+use crate::scene_folder::{SceneFolder, glb};
 
 const LIT: &str =
     "\"diffuse\", \"normal_map\", \"occlusion\", \"rim\", \"lights\", \"shadows\", \"directional_occlusion\"";
@@ -165,6 +166,51 @@ fn blurs_of_nothing_and_of_everything_and_weights_on_one_level() {
     let pairs = bare.iter().flatten().zip(none.iter().flatten());
     pairs.for_each(|(bare, none)| assert!((bare - none).abs() <= 1e-5 * bare.abs(), "{bare} {none}"));
     drawn_alike(&folder, &blurs(1e6, one(2)), "radius 1e6");
+}
+
+/// A square of two triangles, each a chart of its own: the first over a good part of the atlas, the second within one texel
+/// of 64 x 64, around that texel's middle or beside it.
+fn charts_of_one_triangle(around: bool) -> Vec<u8> {
+    let corners = [[-1., -1.], [1., -1.], [1., 1.], [-1., -1.], [1., 1.], [-1., 1.]];
+    let middle = [54.5 / 64.0, 9.5 / 64.0];
+    let (size, aside) = if around { (0.005, 0.0) } else { (0.001, 0.004) };
+    let small = |x: f32, y: f32| [middle[0] + size * x + aside, middle[1] + size * y + aside];
+    let uvs = [[0.05, 0.7], [0.7, 0.7], [0.7, 0.05], small(-1., 1.), small(1., -1.), small(-1., -1.)];
+    let mut bin: Vec<u8> = Vec::new();
+    let mut put = |numbers: &[f32]| numbers.iter().for_each(|x| bin.extend(x.to_le_bytes()));
+    corners.iter().for_each(|[x, y]| put(&[*x, *y, 0.0]));
+    corners.iter().for_each(|_| put(&[0.0, 0.0, 1.0]));
+    uvs.iter().for_each(|uv| put(uv));
+    let view =
+        |offset: usize, length: usize| json!({"buffer": 0, "byteOffset": offset, "byteLength": length});
+    let floats = |view: usize, kind: &str| json!({"bufferView": view, "componentType": 5126, "count": 6, "type": kind});
+    let document = json!({
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "NORMAL": 1, "TEXCOORD_0": 2}}]}],
+        "buffers": [{"byteLength": bin.len()}],
+        "bufferViews": [view(0, 72), view(72, 72), view(144, 48)],
+        "accessors": [floats(0, "VEC3"), floats(1, "VEC3"), floats(2, "VEC2")],
+    });
+    glb(&document, &bin)
+}
+
+#[test]
+fn charts_of_one_triangle_and_of_one_texel_scatter_finite_light() {
+    for around in [true, false] {
+        let folder = scene("diffusion", ("[diffusion]\nlight_map_size = 64\n", ""), false);
+        folder.write("quad.glb", &charts_of_one_triangle(around));
+        let what = format!("a chart within a texel, around its middle: {around}");
+        let observed = baked(&folder).sample().unwrap().observe().unwrap();
+        let names = [&RADII[..], &WEIGHTS, &["base_weight", "light.key.color"]].concat();
+        let engines = Engines::new(&observed, &tied(&names));
+        for radius in [0.05, 2.0, 30.0] {
+            engines.check(&at(&observed, &blurs(radius, [0.3; 3])), &what);
+        }
+        drawn(&folder, &blurs(2.0, [0.3; 3]), &what);
+    }
 }
 
 #[test]

@@ -26,6 +26,8 @@ fn a_fit_finds_a_displaced_camera_and_writes_it_down() {
     let rows = moved.transpose().to_cols_array().map(toml::Value::Float);
     view.insert("world_to_camera".to_owned(), toml::Value::Array(rows.to_vec()));
     view.insert("fov_y_degrees".to_owned(), toml::Value::Float(1.015 * fov));
+    // One view is enough, and the others take as long.
+    aside["view"].as_array_mut().unwrap().truncate(1);
     let fit = aside["fit"].as_table_mut().unwrap();
     fit.insert("cameras".to_owned(), true.into());
     sandbox.write("head/aside.toml", aside.to_string().as_bytes());
