@@ -11,6 +11,8 @@ use serde_json::{Value, json};
 use super::sandbox::{Sandbox, TRUTH, mesh};
 use crate::damage::tree::{json_text, toml_text, tree_damage};
 use crate::damage::{Damage, damage};
+use crate::imported::metashape::metashape_file;
+use crate::imported::opencv::{STORED, XML};
 
 /// `count` values of a strategy, the same every time.
 fn values<S: Strategy>(count: usize, strategy: &S) -> Vec<S::Value> {
@@ -130,6 +132,49 @@ fn states() {
     let damaged = texts(40, &whole, |tree| Some(json_text(tree)));
     let resume = ["fit", "scene.toml", "-o", "run", "--resume", "--engine", "cpu", "--max-iterations", "3"];
     check(&sandbox, "run/state.json", &damaged, &resume, "run");
+}
+
+#[test]
+fn cameras_of_other_programs() {
+    let sandbox = Sandbox::new();
+    let import = |program: &'static str, file: &'static str| {
+        ["import", program, file, "--mesh", "mesh.glb", "--environment", "env.exr", "-o", "made.toml"]
+    };
+    let transforms = json!({
+        "camera_angle_x": 0.6, "w": 32, "h": 32,
+        "frames": [{"file_path": "front", "transform_matrix": [
+            [1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 4.0], [0.0, 0.0, 0.0, 1.0],
+        ]}],
+    });
+    sandbox.write("transforms.json", transforms.to_string().as_bytes());
+    let damaged = texts(40, &transforms, |tree| Some(json_text(tree)));
+    check(&sandbox, "transforms.json", &damaged, &import("transforms", "transforms.json"), "made.toml");
+    for (program, file, whole) in [
+        ("metashape", "cameras.xml", metashape_file()),
+        ("opencv", "camera.yml", STORED.to_owned()),
+        ("opencv", "camera.xml", XML.to_owned()),
+    ] {
+        sandbox.write(file, whole.as_bytes());
+        check(&sandbox, file, &bytes(40, whole.as_bytes()), &import(program, file), "made.toml");
+    }
+}
+
+#[test]
+fn shots_of_a_panorama() {
+    let sandbox = Sandbox::new();
+    for name in ["a.exr", "b.exr"] {
+        sandbox.write_exr(name, 32, 32, |x, y| [0.5 + 0.01 * x as f32, 0.5, 0.5 + 0.01 * y as f32]);
+    }
+    let shot = |name: &str, towards: &str| {
+        format!(
+            "[[shot]]\nfile = \"{name}\"\nlens = \"equidistant\"\ncentre = [16, 16]\nradius = 15.5\n\
+             field_of_view_degrees = 200\ntowards = {towards}\nup = [0, 1, 0]\n"
+        )
+    };
+    let whole = shot("a.exr", "[0, 0, -1]") + &shot("b.exr", "[0, 0, 1]");
+    sandbox.write("shots.toml", whole.as_bytes());
+    let stitch = ["panorama", "stitch", "shots.toml", "-o", "sky.exr", "--width", "32"];
+    check(&sandbox, "shots.toml", &texts(60, &toml_tree(&whole), toml_text), &stitch, "sky.exr");
 }
 
 #[test]
