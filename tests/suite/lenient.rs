@@ -52,6 +52,8 @@ fn containers_may_hold_more_than_the_mesh() {
     assert_eq!(shape(&with_length([plain.as_slice(), &chunk(*b"BIN\0", &[255; 8])].concat())), expected);
     // What is behind the container's end is not of it.
     assert_eq!(shape(&[plain.as_slice(), b"more of something"].concat()), expected);
+    // Nor is padding before it.
+    assert_eq!(shape(&with_length([plain.as_slice(), &[0; 3]].concat())), expected);
     // JSON alone, its buffer a file of its own.
     let mut apart = json;
     apart["buffers"][0]["uri"] = json!("data:application/octet-stream;base64,");

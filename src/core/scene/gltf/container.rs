@@ -41,8 +41,14 @@ pub(super) fn contents(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), String> {
         .ok_or_else(|| format!("its header promises {length} bytes, and it holds {}", bytes.len()))?;
     let (mut json, mut binary) = (None, None);
     while !rest.is_empty() {
-        let (length, body) = word(rest).ok_or_else(|| short("chunk's header"))?;
-        let (kind, body) = body.split_at_checked(4).ok_or_else(|| short("chunk's header"))?;
+        let header = word(rest).and_then(|(length, body)| Some((length, body.split_at_checked(4)?)));
+        let Some((length, (kind, body))) = header else {
+            // Padding behind the last chunk.
+            if json.is_some() {
+                break;
+            }
+            return Err(short("chunk's header"));
+        };
         let (chunk, behind) = body.split_at_checked(length as usize).ok_or_else(|| short("chunk"))?;
         match (json, binary) {
             (None, _) if kind == JSON => json = Some(chunk),

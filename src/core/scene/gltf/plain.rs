@@ -173,7 +173,7 @@ impl Document {
                 Checked::Valid(AlphaMode::Blend) => Alpha::Blend,
                 _ => Alpha::Opaque,
             },
-            emission: material.emissive_factor.0.map(|x| (strength * sound(x)).max(0.0)),
+            emission: material.emissive_factor.0.map(|x| sound(strength * sound(x)).max(0.0)),
             emission_map,
             name,
         };
