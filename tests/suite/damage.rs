@@ -1,7 +1,8 @@
 //! Arbitrary scene files and damaged bytes are thrown at the readers: nothing panics.
 //!
 //! - [`tree`]: damage to what a file says; [`tables`]: constants, plans, results, cases; [`meshes`]: buffers beside a
-//!   glTF file, morph targets, animations, cameras, masks; [`materials`]: what parts are drawn by; [`cameras`]: what other programs say of theirs, responses
+//!   glTF file, morph targets, animations, cameras, masks; [`materials`]: what parts are drawn by, and the skin's own maps;
+//!   [`cameras`]: what other programs say of theirs, responses
 //!
 //! What the program makes of damaged files, and what it leaves behind, is in `cli::damaged`; states of fits are in
 //! `fits::damaged`.

@@ -16,7 +16,8 @@ use skinfit::render::shading::Shading;
 use crate::graphics::bench::{EXACT, gpu, on_gpu};
 use crate::hard_lights::octahedron;
 use crate::lit::{baked, image, param, quad};
-use crate::scene_folder::{SceneFolder, glb};
+use crate::props::file::{File, Shape};
+use crate::scene_folder::SceneFolder;
 
 const LIT: &str =
     "\"diffuse\", \"normal_map\", \"occlusion\", \"rim\", \"lights\", \"shadows\", \"directional_occlusion\"";
@@ -176,25 +177,16 @@ fn charts_of_one_triangle(around: bool) -> Vec<u8> {
     let (size, aside) = if around { (0.005, 0.0) } else { (0.001, 0.004) };
     let small = |x: f32, y: f32| [middle[0] + size * x + aside, middle[1] + size * y + aside];
     let uvs = [[0.05, 0.7], [0.7, 0.7], [0.7, 0.05], small(-1., 1.), small(1., -1.), small(-1., -1.)];
-    let mut bin: Vec<u8> = Vec::new();
-    let mut put = |numbers: &[f32]| numbers.iter().for_each(|x| bin.extend(x.to_le_bytes()));
-    corners.iter().for_each(|[x, y]| put(&[*x, *y, 0.0]));
-    corners.iter().for_each(|_| put(&[0.0, 0.0, 1.0]));
-    uvs.iter().for_each(|uv| put(uv));
-    let view =
-        |offset: usize, length: usize| json!({"buffer": 0, "byteOffset": offset, "byteLength": length});
-    let floats = |view: usize, kind: &str| json!({"bufferView": view, "componentType": 5126, "count": 6, "type": kind});
-    let document = json!({
-        "asset": {"version": "2.0"},
-        "scene": 0,
-        "scenes": [{"nodes": [0]}],
-        "nodes": [{"mesh": 0}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "NORMAL": 1, "TEXCOORD_0": 2}}]}],
-        "buffers": [{"byteLength": bin.len()}],
-        "bufferViews": [view(0, 72), view(72, 72), view(144, 48)],
-        "accessors": [floats(0, "VEC3"), floats(1, "VEC3"), floats(2, "VEC2")],
-    });
-    glb(&document, &bin)
+    let shape = Shape {
+        positions: corners.map(|[x, y]| [x, y, 0.0]).to_vec(),
+        normals: vec![[0.0, 0.0, 1.0]; corners.len()],
+        uvs: uvs.to_vec(),
+        triangles: vec![[0, 1, 2], [3, 4, 5]],
+    };
+    let mut file = File::new();
+    let skin = file.material(json!({"name": "Skin"}));
+    file.put(&shape, skin, [0.0; 3]);
+    file.glb()
 }
 
 #[test]

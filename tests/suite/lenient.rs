@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use skinfit::scene::mesh::Mesh;
 
 use super::plain::{self, SCENE as PLAIN};
-use super::scene_folder::{SceneFolder, glb, quad_parts};
+use super::scene_folder::{SceneFolder, base64, glb, quad_parts};
 
 /// The mesh of the usual scene with this mesh file.
 fn mesh(file: &[u8]) -> Mesh {
@@ -54,9 +54,11 @@ fn containers_may_hold_more_than_the_mesh() {
     assert_eq!(shape(&[plain.as_slice(), b"more of something"].concat()), expected);
     // Nor is padding before it.
     assert_eq!(shape(&with_length([plain.as_slice(), &[0; 3]].concat())), expected);
-    // JSON alone, its buffer a file of its own.
+    // JSON alone, its buffer elsewhere.
     let mut apart = json;
-    apart["buffers"][0]["uri"] = json!("data:application/octet-stream;base64,");
+    apart["buffers"][0]["uri"] = json!(format!("data:;base64,{}", base64(&bin)));
+    let alone = glb(&apart, &[]);
+    assert_eq!(shape(&with_length(alone[..alone.len() - 8].to_vec())), expected);
     let (start, text) = (plain[..12].to_vec(), plain[12..binary_at].to_vec());
     let refused = |file: Vec<u8>| {
         let folder = SceneFolder::new();
@@ -71,9 +73,13 @@ fn containers_may_hold_more_than_the_mesh() {
         let told = refused(plain[..end].to_vec());
         assert!(told.contains("cannot be read as glTF 2.0"), "{end}: {told}");
     }
-    let mut third = plain;
-    third[4] = 3;
-    assert!(refused(third).contains("version 3"));
+    let with = |at: usize, byte: u8| {
+        let mut file = plain.clone();
+        file[at..at + 4].copy_from_slice(&[byte, 0, 0, 0]);
+        refused(file)
+    };
+    assert!(with(4, 3).contains("version 3"));
+    assert!(with(8, 5).contains("fewer than it has itself"));
 }
 
 /// Every whole number of a JSON document as a float.
@@ -93,6 +99,16 @@ fn whole_numbers_may_be_written_as_floats() {
     floats(&mut json);
     assert!(json.to_string().contains("\"byteLength\":") && json.to_string().contains(".0"), "{json}");
     assert_eq!(shape(&glb(&json, &bin)), expected);
+    // What is refused is told by where it stands in the file, and a key that is there twice is refused as ever.
+    let refused = |file: &str| {
+        let folder = SceneFolder::new();
+        folder.write("quad.glb", file.as_bytes());
+        folder.load().unwrap_err().to_string()
+    };
+    let told = refused("{\n\n  \"asset\": {\"version\": \"2.0\"},\n  \"nodes\": [{\"mesh\": \"x\"}]\n}");
+    assert!(told.contains("line 4"), "{told}");
+    let told = refused("{\"asset\": {\"version\": \"2.0\"}, \"scene\": 0, \"scene\": 1}");
+    assert!(told.contains("duplicate field"), "{told}");
     // Not whole is not an index.
     json["nodes"][0]["mesh"] = json!(0.5);
     let folder = SceneFolder::new();
@@ -109,12 +125,17 @@ fn data_uris_may_be_percent_encoded() {
     json["buffers"] =
         json!([{"byteLength": bin.len(), "uri": format!("data:application/octet-stream,{encoded}")}]);
     assert_eq!(shape(json.to_string().as_bytes()), expected);
-    // Cut short, it holds less than was promised.
-    json["buffers"][0]["uri"] = json!("data:,%00%01");
-    let folder = SceneFolder::new();
-    folder.write("quad.glb", json.to_string().as_bytes());
-    let told = folder.load().unwrap_err().to_string();
-    assert!(told.contains("holds 2 bytes of"), "{told}");
+    // Base64 in any letters is base64.
+    json["buffers"][0]["uri"] = json!(format!("data:application/octet-stream; BASE64,{}", base64(&bin)));
+    assert_eq!(shape(json.to_string().as_bytes()), expected);
+    // Cut short, it holds less than was promised; and what has no data.
+    for (uri, words) in [("data:,%00%01", "holds 2 bytes of"), ("data:base64", "without a comma")] {
+        json["buffers"][0]["uri"] = json!(uri);
+        let folder = SceneFolder::new();
+        folder.write("quad.glb", json.to_string().as_bytes());
+        let told = folder.load().unwrap_err().to_string();
+        assert!(told.contains(words), "{told}");
+    }
 }
 
 #[test]
@@ -160,7 +181,10 @@ fn a_photograph_as_a_normal_map_is_told() {
         warnings.iter().any(|warning| warning.to_string().contains("does not look like a normal map"))
     };
     assert!(!normals(|x, y| [100 + 8 * x as u8, 100 + 8 * y as u8, 250]));
-    // Skin in daylight; grey.
+    // Nothing around a chart.
+    assert!(!normals(|x, _| if x < 4 { [0; 3] } else { [128, 128, 255] }));
+    // Skin in daylight, bright skin, whose colours are unit vectors; grey.
     assert!(normals(|x, y| [200 + 5 * x as u8, 150 + 5 * y as u8, 120]));
+    assert!(normals(|x, y| [226 + x as u8, 186 + y as u8, 170]));
     assert!(normals(|_, _| [128; 3]));
 }

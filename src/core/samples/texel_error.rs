@@ -44,8 +44,25 @@ pub enum AtlasError {
     Shading(#[from] ShadingError),
 }
 
-/// A tile's number among UDIMs, of which ten stand in a row, where it has one.
+/// A tile's number among UDIMs, of which ten stand in a row, where it has one. Rows are counted upwards, glTF's v downwards.
 fn udim(u: f32, v: f32) -> String {
-    let named = (0.0..10.0).contains(&u) && (0.0..900.0).contains(&v);
-    if named { format!(", which is UDIM {}", 1001.0 + u + 10.0 * v) } else { String::new() }
+    let row = -v;
+    let named = (0.0..10.0).contains(&u) && (0.0..900.0).contains(&row);
+    if named { format!(", which is UDIM {}", 1001.0 + u + 10.0 * row) } else { String::new() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tiles_are_named_as_udims() {
+        let told = |u: f32, v: f32| AtlasError::Outside { u, v }.to_string();
+        // Mari's numbers: 1002 lies to the right of 1001, 1011 above it.
+        assert!(told(1.0, 0.0).contains("tile (1, 0), which is UDIM 1002, but"), "{}", told(1.0, 0.0));
+        assert!(told(0.0, -1.0).contains("UDIM 1011,") && told(9.0, -2.0).contains("UDIM 1030,"));
+        for (u, v) in [(0.0, 1.0), (10.0, 0.0), (-1.0, 0.0), (0.0, -900.0)] {
+            assert!(!told(u, v).contains("which is UDIM"), "{}", told(u, v));
+        }
+    }
 }

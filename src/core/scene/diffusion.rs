@@ -90,21 +90,21 @@ const HUMAN_HEAD: [(f64, [f64; 3]); 6] = [
 ];
 
 /// The texture coordinates by which the mesh lies in the atlas: those of the maps, or the set that the table names where
-/// nothing is looked up by others.
+/// no map is looked up. `asked` says that something is computed there.
 pub(super) fn atlas_uv(
     source: &Source,
     table: &DiffusionTable,
-    maps: &Maps,
-    of_maps: TextureUv,
+    (maps, of_maps): (&Maps, TextureUv),
+    asked: bool,
 ) -> Result<TextureUv, SceneError> {
     let Some(given) = &table.uv_set else { return Ok(of_maps) };
-    let set = whole(source, Some(given), "uv_set", [0, 15], 0)?;
-    if set == of_maps.set {
-        return Ok(of_maps);
-    }
+    let set = uv_set(source, Some(given))?;
     let Maps { color, normal, specular, attenuator, own, .. } = maps;
     let looked_up = color.is_some() || normal.is_some() || specular.is_some() || attenuator.is_some();
     if looked_up || !own.is_empty() {
+        if set == of_maps.set || !asked {
+            return Ok(of_maps);
+        }
         let what = format!(
             "uv_set = {set}, but the maps are looked up by texture coordinates {}, and a mesh has one set of them here",
             of_maps.set
@@ -113,6 +113,10 @@ pub(super) fn atlas_uv(
         return Err(source.error(given, what, remedy));
     }
     Ok(TextureUv::of_set(set))
+}
+
+fn uv_set(source: &Source, given: Option<&Spanned<i64>>) -> Result<u32, SceneError> {
+    whole(source, given, "uv_set", [0, 15], 0)
 }
 
 /// The table over the defaults: what is made, and by which choices.
@@ -131,6 +135,8 @@ pub(super) fn read(
         given.map_or(Ok(default), |given| source.choose(key, given, &known))
     }
     let default = Diffusion::default();
+    // Which one it is depends on the maps.
+    uv_set(source, table.uv_set.as_ref())?;
     let size =
         whole(source, table.light_map_size.as_ref(), "light_map_size", [64, 8192], default.light_map_size)?;
     let presets = (&Preset::ALL[..], Preset::name as fn(Preset) -> _);

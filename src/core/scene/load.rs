@@ -138,9 +138,7 @@ impl Scene {
             maps.normal = maps.normal.or(normal);
             uv = of_material.uv();
         }
-        if needs.atlas {
-            uv = diffusion::atlas_uv(&source, &file.diffusion, &maps, uv)?;
-        }
+        uv = diffusion::atlas_uv(&source, &file.diffusion, (&maps, uv), needs.atlas)?;
         if choices.normal_filter == NormalFilter::Toksvig {
             maps.normalise_normals();
         }

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use glam::DVec3;
+
 use super::error::{SceneError, Warnings, warn};
 use super::file::{MapsTable, SceneFile, Source};
 use super::images;
@@ -64,19 +66,25 @@ pub(super) fn read_maps(
 pub(super) fn warn_of_other_than_normals(path: &Path, map: &Map<3>, warnings: &mut Warnings) {
     // Filtered, compressed and worn maps have some texels that are far from unit vectors, not a quarter of them.
     const MOST: f64 = 0.25;
-    let is_normal = |texel: &&[f32; 3]| {
-        let [x, y, z] = texel.map(|x| 2.0 * x - 1.0);
-        z > 0.0 && (0.7..1.3).contains(&(x * x + y * y + z * z).sqrt())
-    };
-    let others = 1.0 - map.texels.iter().filter(is_normal).count() as f64 / map.texels.len() as f64;
-    if others > MOST {
-        let message = format!(
-            "does not look like a normal map: {:.0}% of its texels are far from unit vectors that point out of the \
-             surface. Name a tangent-space map as `normal` in [maps]",
-            100.0 * others
-        );
-        warn(warnings, path, message);
+    let (mut count, mut others, mut mean) = (0_u64, 0_u64, DVec3::ZERO);
+    // Around charts there may be nothing.
+    for texel in map.texels.iter().filter(|texel| **texel != [0.0; 3]) {
+        let normal = 2.0 * DVec3::from(texel.map(f64::from)) - 1.0;
+        (count, mean) = (count + 1, mean + normal);
+        others += u64::from(normal.z <= 0.0 || !(0.7..1.3).contains(&normal.length()));
     }
+    let share = others as f64 / count.max(1) as f64;
+    let why = if share > MOST {
+        format!("{:.0}% of its texels are far from unit vectors that point out of the surface", 100.0 * share)
+    } else if mean.truncate().length() > mean.z {
+        // Bumps lean to all sides. Bright colours are unit vectors, too, which lean to one.
+        "its vectors lean to one side by more than 45 degrees on average".to_owned()
+    } else {
+        return;
+    };
+    let message =
+        format!("does not look like a normal map: {why}. Name a tangent-space map as `normal` in [maps]");
+    warn(warnings, path, message);
 }
 
 /// The maps of fields that the scene's terms have `declared`, those alone that the enabled effects ask for.

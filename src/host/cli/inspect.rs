@@ -184,7 +184,10 @@ fn not_read(contents: &MeshContents) -> String {
         lines.push("colours at vertices of skin".to_owned());
     }
     if contents.parts.iter().any(|part| part.uv_sets > 1) {
-        lines.push("texture coordinates but the set that a part's first picture names".to_owned());
+        lines.push(
+            "texture coordinates but the set that a part's first picture names, or `uv_set` in [diffusion]"
+                .to_owned(),
+        );
     }
     lines.extend(contents.unread_extensions.iter().map(|extension| {
         let required = if extension.required { " (required)" } else { "" };

@@ -70,9 +70,11 @@ def test_a_jacobian_is_the_same_by_either_mode(objective: skinfit.Objective, x: 
 
 def test_a_second_derivative_is_refused(objective: skinfit.Objective, x: Vector) -> None:
     image = skinfit.jax.image(objective, "side")
-    with pytest.raises(TypeError, match="first derivatives alone"):
-        jax.hessian(lambda y: image(y).sum())(jnp.array(x))
-    with pytest.raises(ValueError, match="JVP"):
+    for function in (lambda y: image(y).sum(), skinfit.jax.loss(objective)):
+        for hessian in (jax.hessian(function), jax.jit(jax.jacrev(jax.grad(function)))):
+            with pytest.raises(TypeError, match="first derivatives alone"):
+                hessian(jnp.array(x))
+    with jax.enable_x64(False), pytest.raises(TypeError, match="first derivatives alone"):
         jax.hessian(skinfit.jax.loss(objective))(jnp.array(x))
 
 
@@ -84,6 +86,20 @@ def test_it_answers_in_the_kind_that_it_is_asked_in(objective: skinfit.Objective
         assert gradient.dtype == jnp.float32
         exact = objective.gradient(np.asarray(narrow, np.float64))
         assert np.array_equal(gradient, exact.astype(np.float32))
+
+
+def test_64_bits_stay_64_bits_on_a_thread_that_is_told_nothing_of_them(objective: skinfit.Objective, x: Vector) -> None:
+    # JAX calls back on any thread; here it is one without the caller's `jax.enable_x64`.
+    loss = skinfit.jax.loss(objective)
+    both = jax.jit(jax.value_and_grad(loss)).lower(jnp.array(x)).compile()
+    pull = jax.jit(lambda y, weights: jax.vjp(skinfit.jax.image(objective, "side"), y)[1](weights))
+    weights = np.random.default_rng(4).normal(size=objective.image(x, "side").shape)
+    given = jnp.array(x), jnp.array(weights)
+    product = pull.lower(*given).compile()
+    with jax.enable_x64(False):
+        value, gradient = both(given[0])
+        assert np.asarray(value) == objective.loss(x) and np.array_equal(gradient, objective.gradient(x))
+        assert np.array_equal(product(*given)[0], objective.vjp(x, weights, "side"))
 
 
 def test_what_is_no_point_is_told(objective: skinfit.Objective, x: Vector) -> None:

@@ -26,7 +26,8 @@ fn rich() -> (SceneFolder, Value) {
         },
     });
     let mut whole = json!(null);
-    let folder = edited(&eye, SCENE, |mesh, bin| {
+    let scene = SCENE.replace("[\"diffuse\"]", "[\"diffuse\", \"normal_map\"]");
+    let folder = edited(&eye, &scene, |mesh, bin| {
         mesh["materials"][0] = json!({
             "name": "Skin", "normalTexture": {"index": 1, "scale": 0.5},
             "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, "baseColorFactor": [0.5, 0.5, 0.5, 1]},
@@ -79,6 +80,7 @@ fn the_rich_mesh_is_read_when_it_is_whole() {
     let (folder, _) = rich();
     let (scene, warnings) = folder.load().unwrap();
     let parts = scene.mesh.plain.as_ref().unwrap();
+    assert!(scene.maps.color.is_some() && scene.maps.normal.is_some(), "{warnings:?}");
     assert!(parts.materials[0].color_map.is_some() && !parts.corner_colors.is_empty(), "{warnings:?}");
     check_all(Ok((scene, warnings))).unwrap();
 }

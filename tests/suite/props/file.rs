@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::scene_folder::glb;
 
 /// A number that an accessor may hold.
-pub(super) trait Number: Copy {
+pub(crate) trait Number: Copy {
     /// glTF's name of its type.
     const KIND: u32;
 
@@ -29,26 +29,26 @@ macro_rules! numbers {
 numbers!(i8 = 5120, u8 = 5121, i16 = 5122, u16 = 5123, f32 = 5126);
 
 /// A glTF file that is being made.
-pub(super) struct File {
-    pub(super) json: Value,
+pub(crate) struct File {
+    pub(crate) json: Value,
     binary: Vec<u8>,
 }
 
 impl File {
-    pub(super) fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let json = json!({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": []}]});
         Self { json, binary: Vec::new() }
     }
 
     /// The bytes of the file.
-    pub(super) fn glb(&self) -> Vec<u8> {
+    pub(crate) fn glb(&self) -> Vec<u8> {
         let mut json = self.json.clone();
         json["buffers"] = json!([{"byteLength": self.binary.len()}]);
         glb(&json, &self.binary)
     }
 
     /// Put one more into a list of the file; its place there.
-    pub(super) fn add(&mut self, list: &str, one: Value) -> usize {
+    pub(crate) fn add(&mut self, list: &str, one: Value) -> usize {
         if !self.json[list].is_array() {
             self.json[list] = json!([]);
         }
@@ -58,7 +58,7 @@ impl File {
     }
 
     /// A buffer view of bytes.
-    pub(super) fn view(&mut self, bytes: &[u8]) -> usize {
+    pub(crate) fn view(&mut self, bytes: &[u8]) -> usize {
         self.binary.resize(self.binary.len().next_multiple_of(4), 0);
         let start = self.binary.len();
         self.binary.extend(bytes);
@@ -66,7 +66,7 @@ impl File {
     }
 
     /// An accessor of numbers. Rows of several begin at multiples of four bytes, as glTF asks of vertices.
-    pub(super) fn numbers<T: Number, const N: usize>(&mut self, rows: &[[T; N]]) -> usize {
+    pub(crate) fn numbers<T: Number, const N: usize>(&mut self, rows: &[[T; N]]) -> usize {
         let (mut bytes, mut stride) = (Vec::new(), 0);
         for row in rows {
             let start = bytes.len();
@@ -94,14 +94,14 @@ impl File {
     }
 
     /// The same of integers that stand for shares of their range.
-    pub(super) fn shares<T: Number, const N: usize>(&mut self, rows: &[[T; N]]) -> usize {
+    pub(crate) fn shares<T: Number, const N: usize>(&mut self, rows: &[[T; N]]) -> usize {
         let accessor = self.numbers(rows);
         self.json["accessors"][accessor]["normalized"] = json!(true);
         accessor
     }
 
     /// A texture of a picture within the file, with a sampler; its place.
-    pub(super) fn texture(&mut self, png: &[u8], sampler: Value) -> usize {
+    pub(crate) fn texture(&mut self, png: &[u8], sampler: Value) -> usize {
         let view = self.view(png);
         let image = self.add("images", json!({"bufferView": view, "mimeType": "image/png"}));
         let sampler = self.add("samplers", sampler);
@@ -109,12 +109,12 @@ impl File {
     }
 
     /// A material; its place.
-    pub(super) fn material(&mut self, material: Value) -> usize {
+    pub(crate) fn material(&mut self, material: Value) -> usize {
         self.add("materials", material)
     }
 
     /// A primitive of a shape.
-    pub(super) fn primitive(&mut self, shape: &Shape, material: usize) -> Value {
+    pub(crate) fn primitive(&mut self, shape: &Shape, material: usize) -> Value {
         let indices: Vec<[u16; 1]> = shape.triangles.as_flattened().iter().map(|&i| [i]).collect();
         json!({
             "attributes": {
@@ -128,26 +128,26 @@ impl File {
     }
 
     /// A node of the scene; its place.
-    pub(super) fn root(&mut self, node: Value) -> usize {
+    pub(crate) fn root(&mut self, node: Value) -> usize {
         let place = self.add("nodes", node);
         self.json["scenes"][0]["nodes"].as_array_mut().unwrap().push(json!(place));
         place
     }
 
     /// A mesh of primitives.
-    pub(super) fn mesh(&mut self, name: &str, primitives: &[Value]) -> usize {
+    pub(crate) fn mesh(&mut self, name: &str, primitives: &[Value]) -> usize {
         self.add("meshes", json!({"name": name, "primitives": primitives}))
     }
 
     /// A mesh of one shape at a place of the world; its node.
-    pub(super) fn put(&mut self, shape: &Shape, material: usize, at: [f64; 3]) -> usize {
+    pub(crate) fn put(&mut self, shape: &Shape, material: usize, at: [f64; 3]) -> usize {
         let primitive = self.primitive(shape, material);
         let mesh = self.mesh("shape", &[primitive]);
         self.root(json!({"mesh": mesh, "translation": at}))
     }
 
     /// A square of white skin, 2 wide, half a unit behind the middle.
-    pub(super) fn backdrop(&mut self) {
+    pub(crate) fn backdrop(&mut self) {
         let skin = self.material(json!({"name": "Skin"}));
         self.put(&Shape::panel(1.0, 1.0), skin, [0.0, 0.0, -0.5]);
     }
@@ -155,16 +155,16 @@ impl File {
 
 /// Triangles with normals and texture coordinates.
 #[derive(Clone, Default)]
-pub(super) struct Shape {
-    pub(super) positions: Vec<[f32; 3]>,
-    pub(super) normals: Vec<[f32; 3]>,
-    pub(super) uvs: Vec<[f32; 2]>,
-    pub(super) triangles: Vec<[u16; 3]>,
+pub(crate) struct Shape {
+    pub(crate) positions: Vec<[f32; 3]>,
+    pub(crate) normals: Vec<[f32; 3]>,
+    pub(crate) uvs: Vec<[f32; 2]>,
+    pub(crate) triangles: Vec<[u16; 3]>,
 }
 
 impl Shape {
     /// A rectangle that faces +Z, by half its width and height.
-    pub(super) fn panel(x: f32, y: f32) -> Self {
+    pub(crate) fn panel(x: f32, y: f32) -> Self {
         Self {
             positions: vec![[-x, -y, 0.0], [x, -y, 0.0], [x, y, 0.0], [-x, y, 0.0]],
             normals: vec![[0.0, 0.0, 1.0]; 4],
@@ -174,7 +174,7 @@ impl Shape {
     }
 
     /// The sides of a box by half its size: +Z, -Z, +X, -X, +Y, -Y.
-    pub(super) fn sides(half: [f32; 3]) -> [Self; 6] {
+    pub(crate) fn sides(half: [f32; 3]) -> [Self; 6] {
         // Of each side what is outwards, and what is right and up on it.
         [
             ([0., 0., 1.], [1., 0., 0.], [0., 1., 0.]),
@@ -194,7 +194,7 @@ impl Shape {
     }
 
     /// A whole box by half its size.
-    pub(super) fn cuboid(half: [f32; 3]) -> Self {
+    pub(crate) fn cuboid(half: [f32; 3]) -> Self {
         let mut whole = Self::default();
         for side in Self::sides(half) {
             let base = whole.positions.len() as u16;

@@ -8,7 +8,7 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests may stop where the tests themselves would")]
 
 mod character;
-mod file;
+pub(crate) mod file;
 mod moved;
 mod surfaces;
 mod vertices;

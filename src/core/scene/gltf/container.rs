@@ -35,6 +35,9 @@ pub(super) fn contents(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), String> {
     if version != 2 {
         return Err(format!("its container is of version {version}"));
     }
+    if length < 12 {
+        return Err(format!("its header promises {length} bytes, fewer than it has itself"));
+    }
     let mut rest = bytes
         .get(..length as usize)
         .and_then(|own| own.get(12..))

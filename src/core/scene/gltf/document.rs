@@ -66,9 +66,14 @@ impl Document {
     pub(super) fn resolve(&self, uri: &str, place: &str) -> Result<Vec<u8>, SceneError> {
         let at = |error: SceneError| error.at(place);
         if let Some(data) = uri.strip_prefix("data:") {
-            let (head, body) = data.split_once(',').unwrap_or((data, ""));
+            let Some((head, body)) = data.split_once(',') else {
+                return Err(at(
+                    self.error("has a data URI without a comma before its data", "Export it anew")
+                ));
+            };
             let body: Cow<'_, [u8]> = percent_decode_str(body).into();
-            if !head.ends_with(";base64") {
+            let encoding = head.rsplit(';').next().map_or("", str::trim);
+            if !encoding.eq_ignore_ascii_case("base64") {
                 return Ok(body.into_owned());
             }
             let engine = &base64::engine::GeneralPurpose::new(

@@ -16,7 +16,7 @@ const READ: [&str; 4] = [
     "KHR_materials_emissive_strength",
 ];
 /// Required extensions without which a file can be read: what materials add to metallic and rough, which is told where one
-/// is drawn; kinds of pictures, told where one is wanted; and what is said about the file.
+/// is drawn; others of them to choose from; kinds of pictures, told where one is wanted; and what is said about the file.
 const DISPENSABLE: [&str; 20] = [
     "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",

@@ -10,9 +10,10 @@ use serde_json::{Error, Number, Value};
 ///
 /// If it is no JSON, or not glTF's.
 pub(super) fn root(text: &[u8]) -> Result<json::Root, Error> {
-    json::Root::from_slice(text).or_else(|refused| match value(text)?.to_string() {
-        mended if mended.as_bytes() != text => json::Root::from_str(&mended),
-        _ => Err(refused),
+    json::Root::from_slice(text).or_else(|refused| {
+        let mut value = serde_json::from_slice(text)?;
+        // Otherwise what was refused is refused by the place where it stands in the file.
+        if whole(&mut value) { json::Root::from_str(&value.to_string()) } else { Err(refused) }
     })
 }
 
@@ -27,19 +28,21 @@ pub(super) fn value(text: &[u8]) -> Result<Value, Error> {
     Ok(value)
 }
 
-/// Makes integers of floats that are whole and that hold every integer as large as they are.
-fn whole(value: &mut Value) {
+/// Makes integers of floats that are whole, unless they are so large that not every integer is a float. Whether there are any.
+fn whole(value: &mut Value) -> bool {
     const EXACT: f64 = (1_u64 << f64::MANTISSA_DIGITS) as f64;
     match value {
-        Value::Array(items) => items.iter_mut().for_each(whole),
-        Value::Object(fields) => fields.values_mut().for_each(whole),
+        Value::Array(items) => items.iter_mut().map(whole).filter(|changed| *changed).count() > 0,
+        Value::Object(fields) => fields.values_mut().map(whole).filter(|changed| *changed).count() > 0,
         Value::Number(number) => {
             let float = number.as_f64().filter(|x| number.is_f64() && x.fract() == 0.0 && x.abs() < EXACT);
             // The sign of a zero is kept.
-            if let Some(x) = float.filter(|x| *x != 0.0 || x.is_sign_positive()) {
+            let float = float.filter(|x| *x != 0.0 || x.is_sign_positive());
+            if let Some(x) = float {
                 *number = Number::from(x as i64);
             }
+            float.is_some()
         }
-        Value::Null | Value::Bool(_) | Value::String(_) => {}
+        Value::Null | Value::Bool(_) | Value::String(_) => false,
     }
 }

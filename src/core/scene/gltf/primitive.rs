@@ -171,10 +171,12 @@ impl Document {
     ) -> Result<Option<Vec<Vec2>>, SceneError> {
         let Some(index) = index.filter(|_| ask.uvs != Uvs::None) else {
             if ask.uvs == Uvs::Required {
+                let set = ask.uv.set;
                 return Err(self
                     .error(
-                        "has no texture coordinates, but a map is to be looked up",
-                        "Unwrap the mesh, or take the maps out of the scene (or their effects)",
+                        format!("has no texture coordinates {set} (TEXCOORD_{set}), but maps or texels are to be looked up by them"),
+                        "Unwrap the mesh, name another set (`uv_set` in [diffusion]), or take the maps, or the effects that \
+                         look something up, out of the scene",
                     )
                     .at(place));
             }

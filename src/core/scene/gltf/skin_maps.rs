@@ -20,6 +20,8 @@ pub(in crate::scene) struct SkinMaps {
     color: Option<(TextureUse, [f32; 3])>,
     /// Its normal map.
     normal: Option<TextureUse>,
+    /// What it has of these as pictures of formats that are not read.
+    unread: Vec<&'static str>,
 }
 
 impl SkinMaps {
@@ -83,9 +85,18 @@ impl Document {
             }
         }
         let mut found: Vec<(usize, SkinMaps)> = Vec::new();
+        let unread = |maps: &SkinMaps, warnings: &mut Warnings| {
+            for what in &maps.unread {
+                let name = &maps.material;
+                let message =
+                    format!("material {name:?}: its {what} is of a format that is not read, and is left out");
+                warn(warnings, &self.path, message);
+            }
+        };
         for (index, count) in triangles.into_iter().filter(|(_, count)| *count > 0) {
-            match self.maps_of_material(index, wanted, warnings) {
-                Ok(maps) => found.extend(maps.map(|maps| (count, maps))),
+            match self.maps_of_material(index, wanted) {
+                Ok(maps) if maps.color.is_some() || maps.normal.is_some() => found.push((count, maps)),
+                Ok(maps) => unread(&maps, warnings),
                 Err(error) => warn(warnings, &self.path, without(&self.material_name(index), error)),
             }
         }
@@ -94,6 +105,7 @@ impl Document {
         let Some((_, mut maps)) = found.into_iter().rev().max_by_key(|(count, _)| *count) else {
             return Ok(None);
         };
+        unread(&maps, warnings);
         if others > 0 {
             let message = format!(
                 "the skin has {others} more materials with pictures than {:?}, whose maps are taken for all of it: name \
@@ -120,34 +132,30 @@ impl Document {
         Ok(Some(maps))
     }
 
-    /// The maps of a material that are wanted, if it has pictures of them.
-    fn maps_of_material(
-        &self,
-        index: usize,
-        (color, normal): (bool, bool),
-        warnings: &mut Warnings,
-    ) -> Result<Option<SkinMaps>, SceneError> {
+    /// The maps of a material that are wanted.
+    fn maps_of_material(&self, index: usize, (color, normal): (bool, bool)) -> Result<SkinMaps, SceneError> {
         let material = self.get(&self.root.materials, json::Index::new(index as u32), "material")?;
         let surface = &material.pbr_metallic_roughness;
         let [r, g, b, _] = surface.base_color_factor.0;
         let sound = |x: f32| if x.is_finite() { x.max(0.0) } else { 1.0 };
-        let mut shown = |texture: Option<TextureUse>| {
+        let mut unread = Vec::new();
+        let mut shown = |texture: Option<TextureUse>, what: &'static str| {
             let Some(texture) = texture else { return Ok(None) };
             let picture = self.picture(texture)?;
             if picture.is_none() {
-                let why = "a picture's format is not read";
-                warn(warnings, &self.path, without(&self.material_name(index), why));
+                unread.push(what);
             }
             Ok::<_, SceneError>(picture.map(|_| texture))
         };
-        let color = shown(surface.base_color_texture.as_ref().filter(|_| color).map(TextureUse::of))?;
-        let normal = shown(material.normal_texture.as_ref().filter(|_| normal).map(TextureUse::of_normals))?;
-        let maps = SkinMaps {
+        let color = surface.base_color_texture.as_ref().filter(|_| color).map(TextureUse::of);
+        let normal = material.normal_texture.as_ref().filter(|_| normal).map(TextureUse::of_normals);
+        let (color, normal) = (shown(color, "base colour")?, shown(normal, "normal map")?);
+        Ok(SkinMaps {
             material: self.material_name(index),
             color: color.map(|color| (color, [r, g, b].map(sound))),
             normal,
-        };
-        Ok((maps.color.is_some() || maps.normal.is_some()).then_some(maps))
+            unread,
+        })
     }
 
     /// The pictures of the skin's material, those that are `wanted`: of its colour, linear, and of its normals. One that

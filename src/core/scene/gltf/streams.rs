@@ -1,5 +1,6 @@
 //! A mesh file with numbers of its vertices added, as attributes of their own (glTF 2.0, section 3.7.2.1: names that begin
-//! with an underscore are an application's). All else stays as it is: nodes, materials, skins, animations.
+//! with an underscore are an application's). All else stays as it is (nodes, materials, skins, animations), but for whole
+//! numbers that were written as floats.
 //!
 //! The file is written as one .glb: buffers and pictures that stood beside it go into its binary chunk.
 

@@ -73,15 +73,39 @@ def image(objective: Objective, view: str | None = None) -> Callable[[jax.Array]
     return function
 
 
+def _once_more(*_: Any, **__: Any) -> Any:
+    """The derivative of a derivative, which there is none of."""
+    raise TypeError("skinfit has first derivatives alone. For a Hessian take Objective.normal_equations.")
+
+
 def _called(function: Callable[..., Any], shape: tuple[int, ...], *arrays: jax.Array) -> jax.Array:
     """What skinfit makes of these arrays, in the kind of the first."""
     kind = jnp.result_type(arrays[0], float)
+    # JAX calls back on a thread of its own, which need not know of a `jax.enable_x64` of the caller's and would round
+    # float64 to float32 there. So float64 goes both ways as its bits.
+    wide = kind == jnp.float64
 
     def call(*given: Any) -> Any:
-        return np.asarray(function(*(np.asarray(array, np.float64) for array in given)), kind)
+        read = (np.asarray(array).view(np.float64)[..., 0] if wide else np.asarray(array, np.float64) for array in given)
+        made = np.asarray(function(*read), kind, order="C")
+        return made[..., np.newaxis].view(np.uint32) if wide else made
 
-    result: jax.Array = jax.pure_callback(call, jax.ShapeDtypeStruct(shape, kind), *arrays, vmap_method="sequential")
-    return result
+    # Bits have no tangents: without a rule of its own this would be a constant.
+    @jax.custom_jvp
+    def result(*arrays: jax.Array) -> jax.Array:
+        if not wide:
+            narrow: jax.Array = jax.pure_callback(
+                call, jax.ShapeDtypeStruct(shape, kind), *arrays, vmap_method="sequential"
+            )
+            return narrow
+        bits = (jax.lax.bitcast_convert_type(array.astype(kind), jnp.uint32) for array in arrays)
+        made = jax.pure_callback(call, jax.ShapeDtypeStruct((*shape, 2), jnp.uint32), *bits, vmap_method="sequential")
+        exact: jax.Array = jax.lax.bitcast_convert_type(made, kind)
+        return exact
+
+    result.defjvp(_once_more)
+    made: jax.Array = result(*arrays)
+    return made
 
 
 def _linear(name: str, product: Callable[..., Any], made: Callable[..., tuple[int, ...]]) -> Primitive:
@@ -100,13 +124,10 @@ def _linear(name: str, product: Callable[..., Any], made: Callable[..., tuple[in
         ]
         return jax.lax.map(lambda pair: primitive.bind(*pair, **of), tuple(stacks)), 0
 
-    def twice(*_: Any, **__: Any) -> jax.Array:
-        raise TypeError("skinfit has first derivatives alone. For a Hessian take Objective.normal_equations.")
-
     primitive.def_impl(called)
     primitive.def_abstract_eval(lambda _, along, **of: jax.core.ShapedArray(made(**of), along.dtype))
     mlir.register_lowering(primitive, mlir.lower_fun(called, multiple_results=False))
-    ad.defjvp(primitive, twice, lambda tangent, x, _, **of: primitive.bind(x, tangent, **of))
+    ad.defjvp(primitive, _once_more, lambda tangent, x, _, **of: primitive.bind(x, tangent, **of))
     batching.primitive_batchers[primitive] = each
     return primitive
 

@@ -17,7 +17,7 @@ fn blurred(scene: &mut Scene) {
 }
 
 const fn ways(axis: &'static str, title: &'static str, method: &'static str, ways: &'static [Way]) -> Ways {
-    Ways { axis, title, method, effect: EFFECT, idle: IDLE, ways }
+    Ways { axis, title, method, effects: &[EFFECT], idle: IDLE, ways }
 }
 
 fn tapped(scene: &mut Scene, taps: Taps) {

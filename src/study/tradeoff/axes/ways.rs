@@ -23,7 +23,8 @@ pub(super) struct Ways {
     pub(super) axis: &'static str,
     pub(super) title: &'static str,
     pub(super) method: &'static str,
-    pub(super) effect: &'static str,
+    /// Of which one has to be on.
+    pub(super) effects: &'static [&'static str],
     pub(super) idle: &'static str,
     pub(super) ways: &'static [Way],
 }
@@ -34,7 +35,7 @@ pub(super) const SKY: Ways = Ways {
     title: "The sky that a point sees",
     method: "Images with the sky's light found by each way; rays a sample are the reference. Seconds are those of baking, tracing \
              and one pass, nothing cached.",
-    effect: "directional_occlusion",
+    effects: &["directional_occlusion"],
     idle: "the effect directional_occlusion is off",
     ways: &[
         ("scalar", |scene| scene.choices.visibility = Visibility::Scalar),
@@ -54,7 +55,7 @@ pub(super) const LOBE: Ways = Ways {
     title: "What the specular lobe shows of the environment",
     method: "Images with the share of the lobe that the sky fills found by each way; the reference has the lobe's light itself, by \
              rays, the skin's where these meet it. Seconds are those of baking, tracing and one pass, nothing cached.",
-    effect: "fresnel",
+    effects: &["fresnel"],
     idle: "the effect fresnel is off",
     ways: &[
         ("none", |scene| scene.choices.specular_visibility = SpecularVisibility::None),
@@ -71,8 +72,8 @@ pub(super) const MODEL: Ways = Ways {
     title: "The specular BRDF",
     method: "Images with each BRDF at the same roughness, in the lobe and in the lights' highlights; ggx, which masks and shadows \
              facets, is the reference. Seconds are those of baking, tracing and one pass, nothing cached.",
-    effect: "fresnel",
-    idle: "the effect fresnel is off",
+    effects: &["fresnel", "light_specular"],
+    idle: "the effects fresnel and light_specular are off",
     ways: &[
         ("kelemen", |scene| scene.choices.specular_model = SpecularModel::Kelemen),
         ("ggx", |scene| scene.choices.specular_model = SpecularModel::Ggx),
@@ -85,7 +86,7 @@ pub(super) const SPLIT_SUM: Ways = Ways {
     title: "What the specular lobe gives back of the environment",
     method: "Images with the split sum of Schlick's Fresnel factor, and with that of the BRDF's own, which is the reference; \
              with kelemen they are the same. Seconds are those of baking, tracing and one pass, nothing cached.",
-    effect: "fresnel",
+    effects: &["fresnel"],
     idle: "the effect fresnel is off",
     ways: &[
         ("schlick", |scene| scene.choices.split_sum = SplitSum::Schlick),
@@ -99,7 +100,7 @@ pub(super) const LOOKUP: Ways = Ways {
     title: "Where the environment is looked up for the specular lobe",
     method: "Images with the prefiltered environment looked up along the mirrored view and off the lobe's peak; the reference has the \
              lobe's light itself, by rays. Seconds are those of baking, tracing and one pass, nothing cached.",
-    effect: "fresnel",
+    effects: &["fresnel"],
     idle: "the effect fresnel is off",
     ways: &[
         ("mirror", |scene| scene.choices.lobe_lookup = LobeLookup::Mirror),
@@ -115,7 +116,7 @@ pub(super) const NORMALS: Ways = Ways {
     method: "Images with mean normals alone, and with specular lobes widened by how far the normals below a sample are apart, both \
              of filtered maps; the reference has many samples a pixel, each of the finest texels. Errors hold what more samples change \
              beside bumps, at outlines, the same for every way. Seconds are those of baking, tracing and one pass, nothing cached.",
-    effect: "light_specular",
+    effects: &["light_specular"],
     idle: "the effect light_specular is off, whose highlights bumps widen",
     ways: &[
         ("trilinear, none", |scene| filtered(scene, TextureFilter::Trilinear, NormalFilter::None)),
@@ -147,7 +148,7 @@ pub(super) const BOUNCES: Ways = Ways {
     title: "Light that the skin throws back at itself",
     method: "Images without that light, with it by a polynomial of the open share and the albedo, and gathered over the mesh, which is \
              the reference. Seconds are those of baking, tracing and one pass, nothing cached.",
-    effect: "directional_occlusion",
+    effects: &["directional_occlusion"],
     idle: "the effect directional_occlusion is off",
     ways: &[
         ("none", |scene| scene.choices.bounces = Bounces::None),
@@ -162,7 +163,7 @@ pub(super) const REFLECTION: Ways = Ways {
     title: "What the specular lobe sees where it does not see the sky",
     method: "Images with nothing there, and with the skin that the point sees on average; the reference has the lobe's light itself, by \
              rays, which meet the skin. Seconds are those of baking, tracing and one pass, nothing cached.",
-    effect: "fresnel",
+    effects: &["fresnel"],
     idle: "the effect fresnel is off",
     ways: &[
         ("none", |scene| scene.choices.skin_reflection = SkinReflection::None),
@@ -177,9 +178,8 @@ impl SceneAxis for Ways {
     }
 
     fn applies(&self, bench: &Bench<'_>) -> Result<(), &'static str> {
-        let effects = bench.baked.scene.effects;
-        let on = Effect::from_name(self.effect).is_some_and(|effect| effects.has(effect));
-        on.then_some(()).ok_or(self.idle)
+        let on = |name: &&str| Effect::from_name(name).is_some_and(|one| bench.baked.scene.effects.has(one));
+        self.effects.iter().any(on).then_some(()).ok_or(self.idle)
     }
 
     fn seconds(&self, bench: &Bench<'_>, rates: Rates) -> Result<f64, StudyError> {
