@@ -1,14 +1,17 @@
 //! Specular light with Fresnel against the vectors of an independent float64 oracle (tests/vectors_light), and its hard
 //! cases: the exact integrals and filters, and the rules' functions with their derivatives.
 
+use fearless_simd::Level;
 use skinfit::bake::radial::Radial;
+use skinfit::engine::lanes::Lanes;
 use skinfit::model::cube::{texel_direction, texel_solid_angle};
 use skinfit::shader::rule::LIBRARY;
+use skinfit::simd::levels;
 use skinfit_core::specular::brdf::{self, beckmann};
 use skinfit_core::specular::split_sum::{Quadrature, dielectric_sum, split_sum};
 use skinfit_core::specular::{SpecularModel, roughness_of};
 
-use crate::by_rules::Function;
+use crate::by_rules::{Function, Number};
 use crate::common::vectors_light;
 use crate::vectors;
 use crate::vectors::reader::{Node, Tolerance, Vectors};
@@ -24,6 +27,29 @@ fn read() -> Vectors {
 fn library() -> Vec<&'static str> {
     let names = ["specular", "split_sum_kelemen", "split_sum_ggx", "dielectric_sum_ggx"];
     names.map(|name| LIBRARY.iter().find(|(known, _)| *known == name).unwrap().1).to_vec()
+}
+
+/// Numbers of 32 bits: f32, or SIMD lanes of an instruction set.
+#[derive(Clone, Copy, Debug)]
+enum Narrow {
+    Single,
+    InLanes(Level),
+}
+
+impl Narrow {
+    /// All that this machine runs.
+    fn all() -> Vec<Self> {
+        std::iter::once(Self::Single).chain(levels().into_iter().map(Self::InLanes)).collect()
+    }
+
+    /// What is near in them, of what is in f32: lanes have exp2 and log2 by polynomials of some units in the last place, and
+    /// fuse products with sums, where f32 rounds each correctly.
+    fn near(self, single: Tolerance) -> Tolerance {
+        match self {
+            Self::Single => single,
+            Self::InLanes(_) => single.times(4.0),
+        }
+    }
 }
 
 /// A function of the rules, and how it moves along each of the arguments `moved`.
@@ -47,12 +73,26 @@ impl Rule {
         std::iter::once(self.value.of(0.0, arguments)).chain(slopes).collect()
     }
 
-    /// The value in f32.
-    fn single(&self, arguments: &[&[f64]]) -> Vec<f64> {
-        let narrow: Vec<Vec<f32>> =
-            arguments.iter().map(|list| list.iter().map(|&x| x as f32).collect()).collect();
-        let narrow: Vec<&[f32]> = narrow.iter().map(|list| &list[..]).collect();
-        self.value.of(0.0_f32, &narrow).into_iter().map(f64::from).collect()
+    /// The value in numbers of 32 bits.
+    fn narrow(&self, numbers: Narrow, arguments: &[&[f64]]) -> Vec<f64> {
+        match numbers {
+            Narrow::Single => self.value_in(0.0_f32, arguments),
+            Narrow::InLanes(level) => {
+                skinfit_core::with_simd!(level, simd => self.value_in(Lanes::splat(simd, 0.0), arguments))
+            }
+        }
+    }
+
+    fn value_in<R: Number>(&self, like: R, arguments: &[&[f64]]) -> Vec<f64> {
+        let given: Vec<Vec<R>> =
+            arguments.iter().map(|list| list.iter().map(|&x| like.lit(x)).collect()).collect();
+        let given: Vec<&[R]> = given.iter().map(|list| &list[..]).collect();
+        self.value.of(like, &given).into_iter().map(|x| x.unpack()[0]).collect()
+    }
+
+    /// Whether the value is finite in all numbers of 32 bits.
+    fn is_finite(&self, arguments: &[&[f64]]) -> bool {
+        Narrow::all().into_iter().flat_map(|numbers| self.narrow(numbers, arguments)).all(f64::is_finite)
     }
 }
 
@@ -121,9 +161,12 @@ fn lights_are_those_of_the_vectors_with_their_derivatives() {
             tolerance.check("by gloss", &rgb(f[1] * m[2]), &want.at("d_gloss"));
             // At f0 = 0 a root of 1e-12 stands for 0, which counts some twenty fold.
             tolerance.times(4.0).check("by f0", &rgb(f[2]), &want.at("d_f0"));
-            // In f32, with the roundings of directions that a fragment has, too.
-            let narrow = rule.single(&arguments)[0];
-            single(&file, given).check("radiance in f32", &rgb(narrow), &want.at("radiance"));
+            // With the roundings of directions that a fragment has, too.
+            for numbers in Narrow::all() {
+                let radiance = rgb(rule.narrow(numbers, &arguments)[0]);
+                let near = numbers.near(single(&file, given));
+                near.check(&format!("radiance in {numbers:?}"), &radiance, &want.at("radiance"));
+            }
             parts(model, &arguments, &want, tolerance);
         }
         if model == SpecularModel::Kelemen {
@@ -175,7 +218,10 @@ fn distribution_table(file: &Node<'_>) {
     let expected = file.at("expected");
     double(file).check("PH", &all(&|at| rule.of(at)[0][0]), &expected.at("ph_table"));
     double(file).check("PH by m", &all(&|at| rule.of(at)[1][0]), &expected.at("d_ph_table"));
-    narrow.check("PH in f32", &all(&|at| rule.single(at)[0]), &expected.at("ph_table"));
+    for numbers in Narrow::all() {
+        let found = all(&|at| rule.narrow(numbers, at)[0]);
+        numbers.near(narrow).check(&format!("PH in {numbers:?}"), &found, &expected.at("ph_table"));
+    }
 }
 
 #[test]
@@ -198,14 +244,17 @@ fn split_sums_are_those_of_the_vectors_and_the_rules_fits_are_near_them() {
         }
         let fit = Rule::new(&format!("split_sum_{}", model.name()), &[1, 1], &[0, 1]);
         let fitted: Vec<Vec<Vec<f64>>> = places.iter().map(|&(v, m)| fit.of(&[&[v], &[m]])).collect();
-        // The fits' stated error, and in f32 some roundings of sums of up to 5.
+        // The fits' stated error, and in 32 bits some roundings of sums of up to 5.
         let stated = Tolerance { abs: 2e-4, rel: 0.0 };
         let single = Tolerance { abs: 2.1e-4, rel: 0.0 };
         for (i, value) in ["a", "b"].into_iter().enumerate() {
             let column: Vec<f64> = fitted.iter().map(|of| of[0][i]).collect();
             stated.check("fit", &column, &expected.at(value));
-            let narrow: Vec<f64> = places.iter().map(|&(v, m)| fit.single(&[&[v], &[m]])[i]).collect();
-            single.check("fit in f32", &narrow, &expected.at(value));
+            for numbers in Narrow::all() {
+                let at = |&(v, m): &(f64, f64)| fit.narrow(numbers, &[&[v], &[m]])[i];
+                let narrow: Vec<f64> = places.iter().map(at).collect();
+                single.check(&format!("fit in {numbers:?}"), &narrow, &expected.at(value));
+            }
         }
         // An error of 2e-4 that turns within a tenth of the range of m.
         let slopes = Tolerance { abs: 1e-2, rel: 0.0 };
@@ -244,10 +293,13 @@ fn dielectric_fit(f0s: &[f64], places: &[(f64, f64)], expected: &Node<'_>) {
     let column = |of: &dyn Fn(&[&[f64]]) -> f64| -> Vec<f64> {
         all.iter().map(|at| of(&at.each_ref().map(|x| &x[..]))).collect()
     };
-    // The fit's stated error, and in f32 some roundings of sums of up to 5.
+    // The fit's stated error, and in 32 bits some roundings of sums of up to 5.
     let [stated, single] = [3e-4, 3.2e-4].map(|abs| Tolerance { abs, rel: 0.0 });
     stated.check("dielectric", &column(&|at| fit.of(at)[0][0]), &expected.at("es_dielectric"));
-    single.check("dielectric in f32", &column(&|at| fit.single(at)[0]), &expected.at("es_dielectric"));
+    for numbers in Narrow::all() {
+        let narrow = column(&|at| fit.narrow(numbers, at)[0]);
+        single.check(&format!("dielectric in {numbers:?}"), &narrow, &expected.at("es_dielectric"));
+    }
     // That error turns within a tenth of the range of m, and within about as much as f0 is.
     let [by_m, by_f0] = [2e-2, 3e-2].map(|abs| Tolerance { abs, rel: 0.0 });
     by_m.check("dielectric by m", &column(&|at| fit.of(at)[1][0]), &expected.at("d_es_dm"));
@@ -331,16 +383,24 @@ fn occlusion_and_off_peak_directions_are_those_of_the_vectors() {
     let rule = Rule::new("lagarde_visibility", &[1, 1, 1], &[0, 1, 2]);
     let [views, opens, roughnesses] = ["NV", "occ", "m"].map(|name| inputs.at(name).numbers());
     let mut columns = [const { Vec::new() }; 4];
+    let mut places = Vec::new();
     for &view in &views {
         for &open in &opens {
             for &m in &roughnesses {
                 let all = rule.of(&[&[view], &[open], &[m]]).concat();
                 columns.iter_mut().zip(all).for_each(|(column, x)| column.push(x));
+                places.push([[view], [open], [m]]);
             }
         }
     }
     for (column, name) in columns.iter().zip(["value", "d_NV", "d_occ", "d_m"]) {
         tolerance.check(name, column, &expected.at("lagarde").at(name));
+    }
+    for numbers in Narrow::all() {
+        let at = |place: &[[f64; 1]; 3]| rule.narrow(numbers, &place.each_ref().map(|x| &x[..]))[0];
+        let found: Vec<f64> = places.iter().map(at).collect();
+        let near = numbers.near(single(&file, &file));
+        near.check(&format!("lagarde in {numbers:?}"), &found, &expected.at("lagarde").at("value"));
     }
     let rule = Rule::new("off_peak_direction", &[3, 3, 1], &[2]);
     let given = inputs.at("off_peak");
@@ -350,6 +410,11 @@ fn occlusion_and_off_peak_directions_are_those_of_the_vectors() {
         let got = rule.of(&[&n, &r, &[alpha]]);
         let off_peak = expected.at("off_peak");
         tolerance.check("off peak", &got[0], &off_peak.at("direction").item(i));
+        for numbers in Narrow::all() {
+            let found = rule.narrow(numbers, &[&n, &r, &[alpha]]);
+            let near = numbers.near(single(&file, &file));
+            near.check(&format!("off peak in {numbers:?}"), &found, &off_peak.at("direction").item(i));
+        }
         let slope = off_peak.at("d_alpha").item(i);
         if slope.is_null() {
             assert!(got[1].iter().all(|x| x.is_finite()));
@@ -384,8 +449,8 @@ fn cones_overlap_as_caps_of_the_sphere_do() {
             for alpha in [0.0025, 0.05, 0.2, 0.5, 1.0_f64] {
                 let (sine, cosine) = degrees.to_radians().sin_cos();
                 let all = rule.of(&[&[cosine], &[occ], &[alpha]]).concat();
-                let narrow = rule.single(&[&[cosine], &[occ], &[alpha]]);
-                assert!(all.iter().chain(&narrow).all(|x| x.is_finite()), "{degrees} {occ} {alpha}: {all:?}");
+                assert!(all.iter().all(|x| x.is_finite()), "{degrees} {occ} {alpha}: {all:?}");
+                assert!(rule.is_finite(&[&[cosine], &[occ], &[alpha]]), "{degrees} {occ} {alpha}");
                 let (open, lobe) = ((1.0 - occ).sqrt(), 10_f64.powf(-alpha * alpha));
                 let want = shared([0.0, 0.0, 1.0], lobe, [sine, 0.0, cosine], open);
                 assert!((0.0..=1.0 + 1e-9).contains(&all[0]), "{degrees} {occ} {alpha}: {}", all[0]);
@@ -412,13 +477,10 @@ fn values_and_derivatives_are_finite_in_hard_cases() {
                     for f0 in [0.0, 1e-30, 1e-8, 0.028, 0.2, 1.0] {
                         let arguments: [&[f64]; 5] = [&up, &view, &toward, &[m], &[f0]];
                         let all = rule.of(&arguments).concat();
-                        let single = rule.single(&arguments);
-                        for x in all.iter().chain(&single) {
-                            assert!(
-                                x.is_finite(),
-                                "{model:?} {view:?} {toward:?} {m} {f0}: {all:?} {single:?}"
-                            );
-                        }
+                        assert!(
+                            all.iter().all(|x| x.is_finite()) && rule.is_finite(&arguments),
+                            "{model:?} {view:?} {toward:?} {m} {f0}: {all:?}"
+                        );
                     }
                 }
             }
@@ -429,7 +491,7 @@ fn values_and_derivatives_are_finite_in_hard_cases() {
                 let arguments: [&[f64]; 2] = [&[view], &[m]];
                 let all = fit.of(&arguments).concat();
                 assert!(
-                    all.iter().chain(&fit.single(&arguments)).all(|x| x.is_finite()),
+                    all.iter().all(|x| x.is_finite()) && fit.is_finite(&arguments),
                     "{view} {m}: {all:?}"
                 );
                 // A white furnace yields at most what it has.
@@ -443,10 +505,9 @@ fn values_and_derivatives_are_finite_in_hard_cases() {
             for f0 in [0.0, 1e-30, 1e-8, 0.028, 0.2, 1.0] {
                 let arguments: [&[f64]; 3] = [&[view], &[m], &[f0]];
                 let all = fit.of(&arguments).concat();
-                let single = fit.single(&arguments);
                 assert!(
-                    all.iter().chain(&single).all(|x| x.is_finite()),
-                    "{view} {m} {f0}: {all:?} {single:?}"
+                    all.iter().all(|x| x.is_finite()) && fit.is_finite(&arguments),
+                    "{view} {m} {f0}: {all:?}"
                 );
                 assert!((0.0..=1.0).contains(&all[0]), "{view} {m} {f0}: {all:?}");
             }
