@@ -1,5 +1,5 @@
 //! Figures that stand in a page without a raw file: numbers with a unit of measure, decimals, and numbers times a power of
-//! ten (a power alone is an order of magnitude, as tolerances are given).
+//! ten (a power alone is an order of magnitude, as tolerances are given); and the usual measures in words.
 
 use std::path::Path;
 
@@ -43,7 +43,8 @@ pub(crate) fn strays(page: &Path, text: &str) -> Result<Vec<String>, String> {
     let words: Vec<&str> = words.into_iter().filter(|word| !word.is_empty()).collect();
     for (i, word) in words.iter().enumerate() {
         let next = words.get(i + 1).copied().unwrap_or_default();
-        if measured(word, next) {
+        let after = words.get(i + 2).copied().unwrap_or_default();
+        if measured(word, next) || measured_in_words([word, next, after]) {
             let around = &words[i.saturating_sub(4)..(i + 4).min(words.len())];
             found.push(around.join(" "));
         }
@@ -74,6 +75,21 @@ fn measured(word: &str, next: &str) -> bool {
     is_number && (unit(behind) || (behind.is_empty() && unit(next)))
 }
 
+/// Numbers that "times as" and the like stand behind.
+const COUNTS: [&str; 12] =
+    ["two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "twenty", "forty", "hundred"];
+
+/// Whether words begin one of the usual measures: "three times as", "ten times faster", "twice as", "half the time", "a tenth".
+fn measured_in_words(words: [&str; 3]) -> bool {
+    let words =
+        words.map(|word| word.trim_matches(|c: char| !c.is_alphanumeric() && c != '-').to_lowercase());
+    match words.each_ref().map(String::as_str) {
+        [count, "times", "as" | "faster" | "slower" | "less" | "more"] => COUNTS.contains(&count),
+        ["twice" | "half", "as", _] | ["half", "the", "time" | "cost"] | ["a", "tenth", _] => true,
+        _ => false,
+    }
+}
+
 /// Without code in fences, in backquotes and indented, and without comments.
 fn without_code(text: &str) -> String {
     let text: String = text.split("```").step_by(2).collect();
@@ -84,7 +100,7 @@ fn without_code(text: &str) -> String {
     parts.fold(first, |own, part| own + part.split_once("-->").map_or("", |(_, after)| after))
 }
 
-/// Numbers with a unit that are no measurement: the page, its words, and why.
+/// Numbers with a unit, and measures in words, that are no measurement: the page, its words, and why.
 pub(crate) const DEFINITIONS: &[(&str, &str, &str)] = &[
     ("docs/gpu-engine.md", "beyond 8 million", "a limit of the program"),
     ("docs/gpu-engine.md", "from 2 million samples a thread", "a threshold of the program"),
@@ -108,6 +124,14 @@ pub(crate) const DEFINITIONS: &[(&str, &str, &str)] = &[
     ("docs/results.md", "(it is 0.52)", "the target's material"),
     ("docs/results.md", "(0.056)", "the target's material"),
     ("docs/shaders.md", "OpenGL 4.3, OpenGL ES 3.1", "versions"),
+    ("docs/accuracy.md", "to four times as much", "a bound that tests hold"),
+    ("docs/building.md", "half as many again", "a third beside two"),
+    ("docs/gpu-engine.md", "half as much is tried", "a rule of the program"),
+    ("docs/panorama.md", "more than a tenth is clipped", "a rule of the program"),
+    ("docs/results.md", "three times as wide", "of the scenes' cameras"),
+    ("docs/studies.md", "eight times as long", "what is varied"),
+    ("experiments/ablation/README.md", "less than a tenth of the loss", "what the list is of"),
+    ("experiments/race/README.md", "of which half as many numbers", "what was changed"),
 ];
 
 #[cfg(test)]
@@ -127,6 +151,11 @@ mod tests {
             "28 to 30.1 dB",
             "| a | 0.899 |",
             "**1,024 MB**",
+            "Three times as long,",
+            "ten times\nslower.",
+            "it is twice as fast",
+            "(half the time)",
+            "by a tenth",
         ] {
             assert_eq!(found(text), 1, "{text}");
         }
@@ -138,6 +167,7 @@ mod tests {
             "| 8 | seconds of baking |",
             "<!-- figures: page.json#a | {x} | -->\n| a |\n| --- |\n| 0.5 |\n<!-- end -->",
             "| 3 | of 4 passes |",
+            "[5](page.json#a) times as fast, two times, half of it, half the texels, a tenth-order term",
             "to 10⁻⁶, by burn 0.22.1, as in figure 3.",
         ] {
             assert_eq!(found(text), 0, "{text}");
