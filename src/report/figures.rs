@@ -134,7 +134,8 @@ fn terms(view: &ViewEvidence) -> Result<String, String> {
     ))
 }
 
-fn data_uri(picture: &Picture) -> Result<String, String> {
+/// `picture` as the page holds it.
+pub(super) fn data_uri(picture: &Picture) -> Result<String, String> {
     let png = encode_png(picture.width, picture.height, &picture.bytes)?;
     Ok(format!("data:image/png;base64,{}", base64(&png)))
 }

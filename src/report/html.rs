@@ -10,7 +10,7 @@ use super::page::{Page, escape, filled, tile};
 use super::pictures::Picture;
 use super::verdict::{direction, entangled, verdict};
 use super::words::{capital, count, counted, ending, list, number, seconds};
-use super::{RunInfo, charts, errors, figures, maps, tables};
+use super::{RunInfo, charts, diffusion, errors, figures, maps, tables};
 use crate::fit::outcome::Ending;
 use crate::fit::profile::Profile;
 
@@ -34,7 +34,9 @@ pub fn page(
     let sections = sections.map(|((view, (_, scores)), error)| figures::view(view, scores, error, scale));
     let views = sections.collect::<Result<Vec<_>, _>>()?.concat();
     let shown = run.maps.as_ref().map(maps::shown).transpose()?.unwrap_or_default();
+    let diffused = diffusion::shown(&run.diffused)?;
     let fill = |key: &str| match key {
+        "diffusion" => diffused.clone(),
         "warnings" => warnings(&summary.warnings),
         "misfit" => misfit(&summary.misfit),
         "views" => views.clone(),

@@ -6,12 +6,14 @@
 //! - [`pictures`]: target | fit | error side by side
 //! - [`page`], [`plot`]: what all pages share: sortable tables, scatter plots, pictures that wipe
 //! - [`maps`]: what whole maps gained, where they were fitted
+//! - [`diffusion`]: what texture-space diffusion makes in texels
 //! - [`html`]: the page `report.html`, with its `figures`, `charts`, `tables`, `verdict` and `words`
 //!
 //! [`write_run`] leaves all of it in a run's folder, with an EXR of the terms for each view.
 
 mod charts;
 pub mod compared;
+pub mod diffusion;
 pub mod errors;
 pub mod figures;
 mod filter;
@@ -51,6 +53,7 @@ use crate::render::files::{self, Image, ImageFileError, ImageOptions};
 use crate::render::places::Places;
 use crate::scene::Loss;
 use crate::scene::view::Clip;
+use diffusion::DiffusedScene;
 use json::{Summary, ViewSummary};
 use maps::MapEvidence;
 use metrics::Comparison;
@@ -90,6 +93,8 @@ pub struct RunInfo {
     pub made: Vec<(String, String)>,
     /// What whole maps gained, where they were fitted.
     pub maps: Option<MapEvidence>,
+    /// What texture-space diffusion has made in each scene that has it.
+    pub diffused: Vec<DiffusedScene>,
     /// Files that the run's scene names: where one is what an earlier run left, it stays.
     pub named: Vec<PathBuf>,
     /// Other files that the run has left in its folder, by their paths from there.

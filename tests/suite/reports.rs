@@ -13,6 +13,7 @@ use skinfit::model::effects::Form;
 use skinfit::model::params::{Channels, Column, Param, Params};
 use skinfit::render::files::Image;
 use skinfit::render::places::Places;
+use skinfit::report::diffusion::{DiffusedScene, Stage};
 use skinfit::report::{ReportError, RunInfo, StageSeconds, ViewEvidence, write_run};
 use skinfit::scene::Loss;
 
@@ -99,6 +100,7 @@ fn run_of(side: usize) -> RunInfo {
             ("processor".to_owned(), "an AMD EPYC".to_owned()),
         ],
         maps: None,
+        diffused: Vec::new(),
         named: Vec::new(),
         files: Vec::new(),
     }
@@ -531,6 +533,28 @@ fn images_of_another_size_and_folders_that_cannot_be_made_are_refused() {
     let error = write_run(&folder, &self::run(), &outcome()).unwrap_err();
     assert!(error.to_string().contains("cannot be written"), "{error}");
     std::fs::remove_file(&folder).unwrap();
+}
+
+#[test]
+fn stages_of_diffusion_are_shown_scene_by_scene_where_there_are_any() {
+    let folder = folder("diffusion");
+    let page = |diffused: Vec<DiffusedScene>| {
+        write_run(&folder, &RunInfo { diffused, ..run() }, &outcome()).unwrap();
+        std::fs::read_to_string(folder.join("report.html")).unwrap()
+    };
+    assert!(!page(Vec::new()).contains("id=\"diffusion\""));
+    // Larger than what the page shows: every second texel of a side.
+    let image = Image { alpha: vec![1.0; 1024 * 1024], ..Image::new(1024, 1024) };
+    let stage = Stage { name: "light_map".to_owned(), caption: "a <light> map".to_owned(), image };
+    let scene = |name: &str| DiffusedScene { name: name.to_owned(), stages: vec![stage.clone()] };
+    let page = page(vec![scene("noon"), scene("<night>")]);
+    assert_well_formed(&page);
+    let place = |part: &str| page.find(part).unwrap_or_else(|| panic!("{part} is not there"));
+    assert!(place("<section id=\"views\">") < place("<section id=\"diffusion\">"));
+    assert!(place("<h3>noon</h3>") < place("<h3>&lt;night&gt;</h3>"));
+    let figure =
+        "width=\"512\" height=\"512\" alt=\"stage light_map\"><figcaption>a &lt;light&gt; map</figcaption>";
+    assert_eq!(page.matches(figure).count(), 2);
 }
 
 /// The page without its pictures, whose base 64 may spell anything.

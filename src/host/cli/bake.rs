@@ -1,16 +1,15 @@
 //! `skinfit bake`: what a scene's effects ask to be baked, as files to look at.
 
 mod cubes;
-mod stages;
 mod vertices;
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use self::cubes::{Kind, parse_kind};
-use self::stages::Stages;
 use super::run_folder::RunFolder;
 use super::scene::{SceneArguments, parse_effects};
+use super::stages::{Stages, free_of};
 use super::{Exit, Refusal, say, tell, tell_warnings, unfinished};
 use crate::bake::VertexOcclusion;
 use crate::bake::rays::RayMesh;
@@ -18,8 +17,9 @@ use crate::export::vertices::vertex_streams;
 use crate::model::effects::Effects;
 use crate::output;
 use crate::prepare::{Baked, PrepareOptions};
-use crate::samples::PosedSurface;
+use crate::samples::{PosedSurface, atlas_of};
 use crate::scene::streams::mesh_with_streams;
+use crate::shader::term::library;
 
 /// Bake what a scene's effects ask for into files: cube maps, and what rays find at vertices
 #[derive(clap::Args)]
@@ -81,7 +81,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     let written = cubes.len() + usize::from(baked.occlusion.is_some()) + usize::from(vertices.is_some());
     // Before anything is written: it may be refused.
     let stages = match &surface {
-        Some(surface) if arguments.stages => Some(Stages::new(&baked, surface)?),
+        Some(surface) if arguments.stages => Some(stages(&baked, surface)?),
         _ => None,
     };
     let streams = match arguments.glb {
@@ -113,7 +113,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         say(&format!("{:>14}  {from}, {:.3} s", row.name, row.seconds))?;
     }
     if let Some(stages) = stages {
-        let count = stages.write(folder)?;
+        let count = stages.write(folder, &scene.mesh)?;
         say(&format!("wrote {count} stages of diffusion to {}", folder.display()))?;
     }
     match written {
@@ -123,6 +123,24 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         _ => say(&format!("wrote {written} bakes to {}", folder.display()))?,
     }
     Ok(Exit::Done)
+}
+
+/// The stages of a scene's diffusion, of the surface at rest.
+///
+/// # Errors
+/// When the scene has no diffusion, or its mesh no atlas for it.
+fn stages(baked: &Baked, surface: &PosedSurface<'_>) -> Result<Stages, Refusal> {
+    let scene = &*baked.scene;
+    let none = || {
+        Refusal::new(format!(
+            "{}: --stages shows what texture-space diffusion makes, which is off. Enable the effect `diffusion`, or leave \
+             --stages out.",
+            scene.path.display()
+        ))
+    };
+    let scatters = library::scatters(scene.effects);
+    let atlas = atlas_of(scene, surface)?.filter(|_| scatters).ok_or_else(none)?;
+    Ok(Stages::new(baked, &atlas, &scene.params, &free_of(baked))?)
 }
 
 /// A column for each morph target that has a weight; the others are not baked.

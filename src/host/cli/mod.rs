@@ -9,6 +9,7 @@
 //! - `scene`: how a command finds its scene and its cache; `set`: values of parameters on the command line
 //! - `maps`: fits of whole maps, where the program is built with them
 //! - `interrupt`: Ctrl-C once a fit is under way; `unfinished`: what goes with it before, and in the other commands
+//! - `stages`: what diffusion makes in texels, as files and in reports
 //! - `requested`: fits that a window, or another program, asks for
 //! - `run_folder`, `fitted_scene`, `fitted_cameras`: where a fit leaves what it found, and what it was made from
 
@@ -41,6 +42,7 @@ mod scene;
 mod set;
 mod shader;
 mod stability;
+mod stages;
 mod suggest;
 mod sweep;
 mod tradeoff;

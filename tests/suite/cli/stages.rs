@@ -1,6 +1,10 @@
 //! Bakes, caches, effects and layers.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
+
+use base64::Engine as _;
+use skinfit::render::files::Image;
+use skinfit::report::pictures::Picture;
 
 use super::sandbox::{Sandbox, TRUTH, files};
 use crate::fixtures::read_exr;
@@ -195,6 +199,56 @@ fn the_stages_of_diffusion_are_pictures_of_the_atlas() {
     }
     sandbox.edit("light_map_size = 64", "light_map_size = 64\nseams = \"joined\"");
     sandbox.run(&[&export[..], &["glsl"]].concat()).refused(&["across the seams", "seams = \"cut\""]);
+}
+
+/// The pictures of a report's stages of diffusion, by their names.
+fn reported(page: &str) -> BTreeMap<String, image::RgbImage> {
+    let begins = page.find("<section id=\"diffusion\">").unwrap();
+    let section = &page[begins..begins + page[begins..].find("</section>").unwrap()];
+    let figure = |figure: &str| {
+        let uri = figure.split("data:image/png;base64,").nth(1).unwrap().split('"').next().unwrap();
+        let png = base64::engine::general_purpose::STANDARD.decode(uri).unwrap();
+        let name = figure.split("alt=\"stage ").nth(1).unwrap().split('"').next().unwrap();
+        (name.to_owned(), image::load_from_memory(&png).unwrap().to_rgb8())
+    };
+    section.split("<figure>").skip(1).map(figure).collect()
+}
+
+#[test]
+fn the_report_shows_the_stages_of_diffusion_that_the_command_writes() {
+    let sandbox = Sandbox::new();
+    sandbox.fit("without", &[]).done();
+    assert!(!sandbox.text("without/report.html").contains("<section id=\"diffusion\">"));
+    sandbox.edit("[quality]", "[diffusion]\nlight_map_size = 64\n[quality]");
+    sandbox.edit("\"reflection\"]", "\"reflection\", \"diffusion\"]");
+    // The image is linear in it, so that the fit converges whatever the targets are.
+    let ran = sandbox.fit("run", &["--free", "base_weight"]);
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    let page = sandbox.text("run/report.html");
+    let shown = reported(&page);
+    let names: Vec<&str> = shown.keys().map(String::as_str).collect();
+    assert_eq!(names, ["charts", "level_1", "level_2", "level_3", "light_map", "stretch"]);
+    // Standard deviations of 0.6, 1.2 and 2.6 mm: the root of the sum of their squares.
+    assert!(page.contains("the light map blurred by 2.93 mm"), "no radius of level 3");
+
+    let bake = ["bake", "run/scene.toml", "--params", "run/params.toml", "--stages", "-o", "baked"];
+    let baked = sandbox.run(&bake);
+    assert_eq!(baked.code, Some(0), "{baked:?}");
+    for (name, shown) in shown {
+        let planes = read_exr(&sandbox.path(&format!("baked/{name}.exr")));
+        assert_eq!([shown.width(), shown.height()], [64, 64], "{name}");
+        let mut written = Image::new(64, 64);
+        (written.rgb, written.alpha) = (planes.rgb(["R", "G", "B"]), planes.planes["A"].clone());
+        if name == "stretch" {
+            let largest = written.rgb.iter().flatten().fold(0.0_f32, |most, x| most.max(*x));
+            written.rgb.iter_mut().flatten().for_each(|x| *x /= largest);
+        }
+        let expected = Picture::of_image(&written).bytes;
+        assert!(expected.iter().max() > expected.iter().min(), "{name} shows nothing");
+        // Where a file's number is rounded, a byte may be, too.
+        let apart = expected.iter().zip(shown.as_raw()).map(|(a, b)| a.abs_diff(*b)).max();
+        assert!(apart <= Some(1), "{name}: {apart:?}");
+    }
 }
 
 #[test]

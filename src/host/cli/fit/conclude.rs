@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use super::Arguments;
-use super::evidence::evidence;
+use super::evidence::{diffused, evidence};
 use super::scenes::Scenes;
 use super::solve::Solving;
 use super::words::{Times, advice, advice_on_maps, tell_run};
@@ -42,6 +42,7 @@ pub(super) fn conclude(
 ) -> Result<Exit, Refusal> {
     let clock = Instant::now();
     let views = evidence(scenes, &outcome.end)?;
+    let diffused = diffused(scenes, &outcome.end)?;
     let mut seconds = scenes.seconds();
     // Of every process that had a part in it, where the fit was resumed.
     seconds.fit = outcome.seconds;
@@ -58,7 +59,7 @@ pub(super) fn conclude(
         files.extend(scenes.several().then_some(file));
     }
     write_params(arguments, scenes, folder, outcome)?;
-    let mut run = RunInfo { seconds, named, files, ..run_info(arguments, solving, scenes, views) };
+    let mut run = RunInfo { seconds, diffused, named, files, ..run_info(arguments, solving, scenes, views) };
     if let Some(left) = maps {
         tell_warnings(&left.warnings);
         run.warnings.extend(left.warnings.iter().cloned());
@@ -203,6 +204,7 @@ fn run_info(arguments: &Arguments, solving: Solving, scenes: &Scenes, views: Vec
         .collect(),
         made: made(),
         maps: None,
+        diffused: Vec::new(),
         named: Vec::new(),
         files: Vec::new(),
     }

@@ -3,6 +3,7 @@
 use super::scenes::Scenes;
 use crate::cli::Refusal;
 use crate::cli::fit_engine::surfaced_views;
+use crate::cli::stages::Stages;
 use crate::engine::Point;
 use crate::engine::view::ObservedView;
 use crate::model::gain::Gain;
@@ -13,7 +14,9 @@ use crate::render::places::places;
 use crate::render::shade::{PLAIN_LAYER, Shader};
 use crate::report::ViewEvidence;
 use crate::report::compared::compared;
+use crate::report::diffusion::DiffusedScene;
 use crate::scene::view::View;
+use crate::shader::term::library;
 
 /// For each view the target, the fit and its terms: those that were fitted, scene by scene, then those that were held
 /// out.
@@ -40,6 +43,21 @@ pub(super) fn evidence(scenes: &Scenes, end: &Point) -> Result<Vec<ViewEvidence>
     bar.finish_and_clear();
     fitted.extend(others);
     Ok(fitted)
+}
+
+/// What diffusion has made in texels of each scene that has it, at the end of the fit. The texels are those of the
+/// samples, whose fields are found already: one more pass over them is all that it takes.
+pub(super) fn diffused(scenes: &Scenes, end: &Point) -> Result<Vec<DiffusedScene>, Refusal> {
+    let mut diffused = Vec::new();
+    for part in scenes.parts.iter().filter(|part| library::scatters(part.baked.scene.effects)) {
+        let fitted = scenes.engine(part).map(surfaced_views).transpose()?;
+        let mut views = fitted.iter().flat_map(|views| views.iter()).chain(&part.held.observed);
+        let Some(atlas) = views.find_map(|view| view.samples.atlas.as_deref()) else { continue };
+        let params = scenes.point_of(part, end).params;
+        let name = if scenes.several() { part.name.clone() } else { String::new() };
+        diffused.push(Stages::new(&part.baked, atlas, &params, &[])?.shown(name, &params));
+    }
+    Ok(diffused)
 }
 
 /// The images of a view of a scene, at the scene's constants.

@@ -1,26 +1,28 @@
-//! `skinfit bake --stages`: what texture-space diffusion makes in texels of the UV atlas, as pictures (MODEL 6).
+//! What texture-space diffusion makes in texels of the UV atlas, as pictures (MODEL 6): files of `skinfit bake --stages`,
+//! and a section of a fit's report.
 
 use std::path::Path;
 
-use super::super::Refusal;
+use super::Refusal;
 use crate::engine::Unknown;
 use crate::engine::cubes_at::CubesAt;
 use crate::engine::levels::LevelMaker;
 use crate::engine::rules::sample_facts;
-use crate::model::params::Param;
+use crate::model::params::{Param, Params};
 use crate::output;
 use crate::prepare::Baked;
 use crate::progress::bar;
 use crate::render::files::{ImageOptions, write_exr, write_png};
 use crate::render::image::Image;
 use crate::render::tonemap::ToneMap;
-use crate::samples::{Atlas, PosedSurface, atlas_of};
+use crate::report::diffusion::{DiffusedScene, Stage};
+use crate::report::number;
+use crate::samples::Atlas;
 use crate::scene::charts;
 use crate::scene::mesh::Mesh;
 use crate::shader::tangent::chain::Seed;
-use crate::shader::term::library;
 use skinfit_core::program::lower::Natives;
-use skinfit_core::program::shading::Shading;
+use skinfit_core::program::shading::{Shading, ShadingError};
 
 /// The light map, and the levels that are made of it.
 const LIGHT_MAP: &str = "diffusion_level_0";
@@ -45,54 +47,42 @@ enum Shown {
 /// each parameter that is free in the scene's fit how light map and levels move along it.
 pub(super) struct Stages {
     pictures: Vec<(String, Image, Shown)>,
-    /// The chart of each vertex, counted from 1.
-    charts: Vec<u32>,
 }
 
 impl Stages {
-    /// Make them of the surface at rest.
+    /// Make them in texels of `atlas` at `params`, and how they move along each of `free`.
     ///
     /// # Errors
-    /// When the scene has no diffusion, or its mesh no atlas for it.
-    pub(super) fn new(baked: &Baked, surface: &PosedSurface<'_>) -> Result<Self, Refusal> {
-        let (scene, setup) = (&*baked.scene, baked.setup());
-        let scatters = library::scatters(setup.effects);
-        let none = || {
-            Refusal::new(format!(
-                "{}: --stages shows what texture-space diffusion makes, which is off. Enable the effect `diffusion`, or leave \
-             --stages out.",
-                scene.path.display()
-            ))
-        };
-        let atlas = atlas_of(scene, surface)?.filter(|_| scatters).ok_or_else(none)?;
-        let mut free: Vec<Param> = Vec::new();
-        for unknown in baked.unknowns() {
-            let Unknown::Param(column) = unknown else { continue };
-            if column.param.asked_for(setup.effects) && !free.contains(&column.param) {
-                free.push(column.param);
-            }
-        }
+    /// When rules that a level is made by cannot be computed on the processor.
+    pub(super) fn new(
+        baked: &Baked,
+        atlas: &Atlas,
+        params: &Params,
+        free: &[Param],
+    ) -> Result<Self, ShadingError> {
         let seeds: Vec<Seed> = free.iter().map(|&param| Seed::of_param(param)).collect();
-        let facts = sample_facts(setup, &baked.illumination, true);
+        let facts = sample_facts(baked.setup(), &baked.illumination, true);
         let shading = Shading::new(&facts, &seeds, |_| None, Natives::Written)?;
         let maker = LevelMaker::<f32>::new(shading.levels);
-        let made =
-            maker.make(&atlas, &scene.params, &CubesAt::new(&baked.illumination, &scene.params, |x| x)).all();
-        let mut pictures = vec![("charts".to_owned(), picture_of_charts(&atlas), Shown::Light)];
+        let made = maker.make(atlas, params, &CubesAt::new(&baked.illumination, params, |x| x)).all();
+        let mut pictures = vec![("charts".to_owned(), picture_of_charts(atlas), Shown::Light)];
         for (name, level) in &made {
-            let Some((name, shown)) = file_of(name, &free) else { continue };
-            pictures.push((name, picture(&atlas, |texel| level[texel]), shown));
+            let Some((name, shown)) = file_of(name, free) else { continue };
+            pictures.push((name, picture(atlas, |texel| level[texel]), shown));
         }
-        let Mesh { positions, uvs, triangles, .. } = &scene.mesh;
-        Ok(Self { pictures, charts: charts::charts(positions, uvs, triangles) })
+        // What blurs are scaled by comes before them.
+        pictures[1..].sort_by_key(|(name, ..)| name != "stretch");
+        Ok(Self { pictures })
     }
 
-    /// Write each as an EXR and a PNG file into `folder`, and the vertices' charts; returns how many there are.
+    /// Write each as an EXR and a PNG file into `folder`, and the charts of the vertices of `mesh`; returns how many there are.
     ///
     /// # Errors
     /// When a file cannot be written.
-    pub(super) fn write(&self, folder: &Path) -> Result<usize, Refusal> {
-        let rows = self.charts.iter().enumerate().map(|(vertex, chart)| format!("{vertex},{chart}\n"));
+    pub(super) fn write(&self, folder: &Path, mesh: &Mesh) -> Result<usize, Refusal> {
+        let Mesh { positions, uvs, triangles, .. } = mesh;
+        let charts = charts::charts(positions, uvs, triangles);
+        let rows = charts.iter().enumerate().map(|(vertex, chart)| format!("{vertex},{chart}\n"));
         let text = std::iter::once("vertex,chart\n".to_owned()).chain(rows).collect::<String>();
         output::write(&folder.join("charts.csv"), text.as_bytes())?;
         let progress = bar("stages", 2 * self.pictures.len() as u64);
@@ -109,6 +99,49 @@ impl Stages {
         }
         progress.finish_and_clear();
         Ok(self.pictures.len())
+    }
+
+    /// As the report shows them, of the scene that is called `scene`, at `params`.
+    pub(super) fn shown(&self, scene: String, params: &Params) -> DiffusedScene {
+        let stage = |(name, image, shown): &(String, Image, Shown)| Stage {
+            name: name.clone(),
+            caption: caption(name, image, params),
+            image: on_screen(image, *shown),
+        };
+        DiffusedScene { name: scene, stages: self.pictures.iter().map(stage).collect() }
+    }
+}
+
+/// The parameters that are free in a scene's fit and that its effects ask for.
+pub(super) fn free_of(baked: &Baked) -> Vec<Param> {
+    let mut free: Vec<Param> = Vec::new();
+    for unknown in baked.unknowns() {
+        let Unknown::Param(column) = unknown else { continue };
+        if column.param.asked_for(baked.setup().effects) && !free.contains(&column.param) {
+            free.push(column.param);
+        }
+    }
+    free
+}
+
+/// What a stage shows, with its unit.
+fn caption(name: &str, image: &Image, params: &Params) -> String {
+    match name {
+        "charts" => "charts: a colour for each".to_owned(),
+        "stretch" => format!(
+            "stretch: red along u, green along v; 1 is {} of the scene's units a texel",
+            number(f64::from(largest(image)), 3)
+        ),
+        "light_map" => "light map: linear radiance, before it is blurred".to_owned(),
+        "sum" => "sum of the levels by their weights: linear radiance, looked up by pixels".to_owned(),
+        _ => {
+            let level = name.strip_prefix("level_").and_then(|k| k.parse::<usize>().ok()).unwrap_or(0);
+            let of = |k: usize| Param::from_name(&format!("diffusion_radius_{k}"));
+            // The variances of blurs of blurs add.
+            let variance: f64 = (1..=level).filter_map(of).map(|param| params.scalar(param).powi(2)).sum();
+            let deviation = number(variance.sqrt(), 3);
+            format!("level {level}: linear radiance, the light map blurred by {deviation} mm")
+        }
     }
 }
 
@@ -157,8 +190,13 @@ fn picture_of_charts(atlas: &Atlas) -> Image {
     })
 }
 
+/// The greatest number of an image, whatever its sign.
+fn largest(image: &Image) -> f32 {
+    image.rgb.iter().flatten().fold(0.0, |most, x| most.max(x.abs()))
+}
+
 fn on_screen(image: &Image, shown: Shown) -> Image {
-    let largest = image.rgb.iter().flatten().fold(0.0_f32, |most, x| most.max(x.abs()));
+    let largest = largest(image);
     let scale = if largest > 0.0 { 1.0 / largest } else { 0.0 };
     let mut image = image.clone();
     for (rgb, alpha) in image.rgb.iter_mut().zip(&image.alpha) {
