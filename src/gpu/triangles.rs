@@ -1,5 +1,5 @@
 //! The order in which a mesh's triangles stand on the device: skin first, then what is drawn plainly, material by
-//! material, of which what stands in light's way comes before what does not.
+//! material, of which what stops all light comes before what has holes or blends.
 
 use std::ops::Range;
 
@@ -15,7 +15,7 @@ pub(super) struct Triangles {
     pub(super) corners: Vec<[u32; 3]>,
     /// How many of them are skin.
     pub(super) skin: u32,
-    /// How many, from the first on, stand in light's way.
+    /// How many, from the first on, stop all light.
     pub(super) blocking: u32,
     /// The others than skin: the place of a material, and its triangles.
     pub(super) plain: Vec<(u16, Range<u32>)>,
@@ -50,11 +50,6 @@ impl Triangles {
         }
         let corners = order.iter().map(|&triangle| mesh.triangles[triangle as usize]).collect();
         Self { order, corners, skin: skin as u32, blocking: blocking as u32, plain }
-    }
-
-    /// Those that are not skin.
-    pub(super) fn of_parts(&self) -> &[[u32; 3]] {
-        &self.corners[self.skin as usize..]
     }
 
     /// Those that are skin.

@@ -13,6 +13,7 @@ use wgpu::{
 
 use super::device::Gpu;
 use super::error::{GpuError, Oversized};
+use super::plain::Materials;
 use super::shadow::{self, Mapped};
 use super::texels::{self, Texels};
 use super::timing::Timer;
@@ -82,6 +83,8 @@ pub(super) struct Uploads {
     /// The lights that have shadow maps, and those, once a plan reads them.
     mapped: Vec<Mapped>,
     shadow_maps: Option<shadow::Maps>,
+    /// What is not skin is drawn by, once something draws it.
+    materials: Option<Arc<Materials>>,
     indices: Buffer,
     /// What `indices` holds.
     triangles: Triangles,
@@ -149,6 +152,7 @@ impl Uploads {
             mip_maps: None,
             mapped,
             shadow_maps: None,
+            materials: None,
             indices,
             triangles,
             bytes,
@@ -293,11 +297,22 @@ impl Uploads {
         let scene = Arc::clone(&self.content.scene);
         let lights = self.mapped.clone();
         let mut maps = shadow::Maps::new(gpu, facts, lights, scene.shadow_maps, self)?;
-        maps.set_pose(gpu, &scene.mesh.pose().positions);
+        maps.set_mesh(gpu, &scene.mesh);
         self.bytes += maps.bytes();
         self.resources.extend(maps.bound(gpu));
         self.shadow_maps = Some(maps);
         Ok(())
+    }
+
+    /// The materials of what is not skin.
+    pub(super) fn materials(&mut self, gpu: &Gpu) -> Result<Arc<Materials>, GpuError> {
+        if let Some(materials) = &self.materials {
+            return Ok(Arc::clone(materials));
+        }
+        let parts = self.content.scene.mesh.plain.as_ref();
+        let made = Materials::new(gpu, parts.map_or(&[], |parts| &parts.materials))?;
+        self.bytes += made.bytes();
+        Ok(Arc::clone(self.materials.insert(Arc::new(made))))
     }
 
     /// Draw the shadow maps, where a plan reads them and what they show has changed.
@@ -416,7 +431,7 @@ impl Uploads {
         own: Option<&PoseBake>,
     ) -> Result<(), GpuError> {
         if let Some(maps) = &mut self.shadow_maps {
-            maps.set_pose(gpu, &mesh.pose().positions);
+            maps.set_mesh(gpu, mesh);
         }
         let occlusion = own.and_then(|own| own.occlusion.as_ref());
         let occluded = occlusion.is_some();

@@ -4,6 +4,7 @@ use std::path::Path;
 use web_time::Instant;
 
 use super::cache::{self, Found, Key};
+use super::cutouts::Cutouts;
 use super::harmonics::Order;
 use super::interreflection::Albedo;
 use super::panorama::Radiance;
@@ -132,10 +133,14 @@ fn posed_key(mut key: Key, pose: &(dyn Fn(&[f32]) -> PosedMesh + Sync), morphs: 
     for target in 0..=morphs {
         let weights: Vec<f32> = (1..=morphs).map(|i| f32::from(u8::from(i == target))).collect();
         let posed = pose(&weights);
-        key = key.with(&posed.positions).with(&posed.normals).with(posed.occluders().as_flattened());
+        key = key.with(&posed.positions).with(&posed.normals).with(posed.triangles.as_flattened());
         vertices = posed.positions.len();
         if let Some(rest) = posed.rest.as_deref().filter(|_| target == 0) {
             key = key.with(&rest.positions).with(&rest.normals);
+        }
+        // Those of all poses are the same.
+        if let Some(cutouts) = Cutouts::of(&posed).filter(|_| target == 0) {
+            key = cutouts.key(key);
         }
     }
     (key, vertices)

@@ -10,11 +10,12 @@ use std::sync::LazyLock;
 use crate::{files, output};
 
 /// All that makes bakes of their inputs: another text may make others, so that old files are left alone.
-const SOURCES: [&str; 29] = [
+const SOURCES: [&str; 32] = [
     include_str!("baker.rs"),
     include_str!("between.rs"),
     include_str!("cache.rs"),
     include_str!("coefficients.rs"),
+    include_str!("cutouts.rs"),
     include_str!("harmonics.rs"),
     include_str!("interreflection.rs"),
     include_str!("lobe_kernel.rs"),
@@ -38,6 +39,8 @@ const SOURCES: [&str; 29] = [
     include_str!("turning.rs"),
     include_str!("vertex_rays.rs"),
     include_str!("wide_bvh.rs"),
+    include_str!("../scene/maps.rs"),
+    include_str!("../scene/plain.rs"),
     include_str!("../scene/sky_lights.rs"),
     crate::model::cube::SOURCE,
 ];

@@ -13,7 +13,7 @@
 //! - [`transfer`]: which of that light arrives at each vertex, past the mesh ([`interreflection`]: and by way of it);
 //!   [`shadowed`]: how much; [`sky`]: which of both a scene asks for
 //! - [`thickness`]: how far below each vertex the mesh's far side lies
-//! - [`rays`]: the mesh as rays see it; `wide_bvh`: as many rays do
+//! - [`rays`]: the mesh as rays see it; `wide_bvh`: as many rays do, `packet` by packet; `cutouts`: where they go through
 //! - `between`: bakes of poses between two
 //! - [`cache`]: bakes kept between runs (`baker`: each bake through it)
 
@@ -21,6 +21,7 @@ mod baker;
 mod between;
 pub mod cache;
 pub mod coefficients;
+mod cutouts;
 pub mod harmonics;
 pub mod interreflection;
 mod lobe_kernel;

@@ -3,9 +3,10 @@
 //! What they share is worked out once: which of a node's eight boxes any of them may meet, and where they start from one
 //! place, boxes and triangles relative to that. What is left is one box, or one triangle, against sixteen rays.
 
-use fearless_simd::{Simd, f32x4, f32x8, f32x16, prelude::*};
+use fearless_simd::{Simd, f32x4, f32x8, f32x16, mask32x16, prelude::*};
 use glam::Vec3A;
 
+use super::cutouts::Cutouts;
 use super::wide_bvh::{Block, NOTHING, Node};
 
 /// Rays of a packet.
@@ -147,9 +148,9 @@ impl<const ONE: bool, S: Simd> Packet<ONE, S> {
 
     /// Take note of the block's triangles that rays meet before anything else, and say whether there are any. An edge's
     /// test is the exact negative of its neighbour's, so no ray slips between two triangles. What a ray starts on it does
-    /// not meet.
+    /// not meet, nor what is cut out.
     #[inline(always)]
-    pub(super) fn triangles<const FIRST: bool>(&mut self, block: &Block) -> bool {
+    pub(super) fn triangles<const FIRST: bool>(&mut self, block: &Block, cutouts: Option<&Cutouts>) -> bool {
         let all = |x: f32| f32x16::splat(self.simd, x);
         let mut shared = [[f32x4::splat(self.simd, 0.0); 3]; 3];
         let mut heights = shared[0][0];
@@ -163,7 +164,7 @@ impl<const ONE: bool, S: Simd> Packet<ONE, S> {
             (shared, heights) = planes(shared);
         }
         let mut any = false;
-        for k in 0..block.count {
+        for k in 0..block.count as usize {
             let (mut edges, mut height) = ([[all(0.0); 3]; 3], all(heights.as_array()[k]));
             for edge in 0..3 {
                 for axis in 0..3 {
@@ -186,7 +187,12 @@ impl<const ONE: bool, S: Simd> Packet<ONE, S> {
                 continue;
             }
             let distance = height / determinant;
-            let met = inside & distance.simd_gt(all(0.0)) & distance.simd_lt(self.farthest);
+            let mut met = inside & distance.simd_gt(all(0.0)) & distance.simd_lt(self.farthest);
+            if let Some(cutouts) = cutouts.filter(|_| block.cut >> k & 1 == 1) {
+                let shares = [(v / determinant).into(), (w / determinant).into()];
+                let stopped = cutouts.stopped(block.index[k], met.to_bitmask(), shares);
+                met = mask32x16::from_bitmask(self.simd, stopped);
+            }
             self.farthest = met.select(if FIRST { distance } else { all(-1.0) }, self.farthest);
             let mut met = met.to_bitmask();
             any |= met != 0;

@@ -2,7 +2,7 @@
 //! (`wide_bvh`).
 
 use std::collections::HashSet;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use glam::{Vec3, Vec3A};
 use obvhs::BvhBuildParams;
@@ -13,6 +13,7 @@ use obvhs::ploc::PlocBuilder;
 use obvhs::ray::{Ray, RayHit};
 use obvhs::triangle::Triangle;
 
+use super::cutouts::Cutouts;
 use super::wide_bvh::WideBvh;
 use crate::scene::mesh::PosedMesh;
 
@@ -32,6 +33,8 @@ pub struct RayMesh {
     triangles: Vec<Triangle>,
     /// For each triangle, which one it is in the mesh.
     index: Vec<u32>,
+    /// Those that packets of rays go through in places.
+    cutouts: Option<Arc<Cutouts>>,
     /// The hierarchy for packets of rays, made when the first of them comes.
     wide: OnceLock<WideBvh>,
 }
@@ -100,24 +103,29 @@ impl RayMesh {
         };
         let triangles: Vec<Triangle> = index.iter().map(triangle).collect();
         let bvh = (!triangles.is_empty()).then(|| hierarchy(&triangles));
-        Self { bvh, triangles, index, wide: OnceLock::new() }
+        Self { bvh, triangles, index, cutouts: None, wide: OnceLock::new() }
     }
 
-    /// That of what stands in a light's way, of a mesh in its pose.
+    /// That of a mesh in its pose; packets of rays go through what its materials' alpha cuts out of it.
     #[must_use]
     pub fn of(mesh: &PosedMesh) -> Self {
-        Self::new(&mesh.positions, &mesh.occluders())
+        let cutouts = Cutouts::of(mesh).map(Arc::new);
+        Self { cutouts, ..Self::new(&mesh.positions, &mesh.triangles) }
     }
 
     /// The hierarchy for packets of rays.
     pub(crate) fn wide(&self) -> &WideBvh {
-        self.wide.get_or_init(|| WideBvh::new(self.bvh.as_ref(), &self.triangles, &self.index))
+        self.wide.get_or_init(|| self.widened())
+    }
+
+    fn widened(&self) -> WideBvh {
+        WideBvh::new(self.bvh.as_ref(), &self.triangles, &self.index, self.cutouts.clone())
     }
 
     /// The same with the instructions of `level`.
     #[cfg(test)]
     pub(crate) fn wide_at(&self, level: fearless_simd::Level) -> WideBvh {
-        let mut wide = WideBvh::new(self.bvh.as_ref(), &self.triangles, &self.index);
+        let mut wide = self.widened();
         wide.level = level;
         wide
     }

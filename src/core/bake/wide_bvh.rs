@@ -1,10 +1,13 @@
 //! Many rays against a mesh: the hierarchy of `rays`, walked by packets of sixteen (`packet`) that go about the same way.
 
+use std::sync::Arc;
+
 use fearless_simd::{Level, Simd};
 use glam::Vec3A;
 use obvhs::cwbvh::CwBvh;
 use obvhs::triangle::Triangle;
 
+use super::cutouts::Cutouts;
 use super::packet::{LANES, LATER, Packet, Segment};
 use crate::with_simd;
 
@@ -26,20 +29,29 @@ pub(super) struct Block {
     pub(super) corners: [[[f32; 4]; 3]; 3],
     /// Which triangle of the mesh each is.
     pub(super) index: [u32; 4],
-    pub(super) count: usize,
+    pub(super) count: u32,
+    /// Those that rays go through in places, a bit each.
+    pub(super) cut: u32,
 }
 
 /// A hierarchy of boxes over triangles.
 pub(crate) struct WideBvh {
     nodes: Vec<Node>,
     blocks: Vec<Block>,
+    /// Where rays go through triangles; none where all are whole.
+    cutouts: Option<Arc<Cutouts>>,
     pub(super) level: Level,
 }
 
 impl WideBvh {
     /// Of the triangles of `bvh`; which one of the mesh each is, `index` tells.
-    pub(super) fn new(bvh: Option<&CwBvh>, triangles: &[Triangle], index: &[u32]) -> Self {
-        let mut wide = Self { nodes: Vec::new(), blocks: Vec::new(), level: Level::new() };
+    pub(super) fn new(
+        bvh: Option<&CwBvh>,
+        triangles: &[Triangle],
+        index: &[u32],
+        cutouts: Option<Arc<Cutouts>>,
+    ) -> Self {
+        let mut wide = Self { nodes: Vec::new(), blocks: Vec::new(), cutouts, level: Level::new() };
         let Some(bvh) = bvh else { return wide };
         for node in &bvh.nodes {
             let mut own = Node { bounds: [[[0.0; 8]; 3]; 2], child: [NOTHING; 8], count: 0 };
@@ -52,7 +64,7 @@ impl WideBvh {
                 own.child[to] = if node.is_leaf(i) {
                     let (first, count) = node.child_primitives(i);
                     let slots = &bvh.primitive_indices[first as usize..][..count as usize];
-                    wide.blocks.push(Block::of(slots, triangles, index));
+                    wide.blocks.push(Block::of(slots, triangles, index, wide.cutouts.as_deref()));
                     BLOCK | (wide.blocks.len() as u32 - 1)
                 } else {
                     node.child_node_index(i)
@@ -64,8 +76,8 @@ impl WideBvh {
         wide
     }
 
-    /// Whether each ray from `origin` along unit directions meets any triangle, from either side. Rays that go the same
-    /// way should follow one another.
+    /// Whether each ray from `origin` along unit directions meets any triangle, from either side, where that is not cut
+    /// out. Rays that go the same way should follow one another.
     pub(crate) fn hits(&self, origin: Vec3A, directions: &[Vec3A]) -> Vec<bool> {
         let mut found = vec![NOTHING; directions.len()];
         with_simd!(self.level, simd => self.trace_all::<false, _>(simd, origin, directions, &mut found));
@@ -127,7 +139,7 @@ impl WideBvh {
         packet: &mut Packet<ONE, S>,
         stack: &mut Vec<(u32, f32)>,
     ) {
-        let mut farthest = packet.farthest();
+        let (mut farthest, cutouts) = (packet.farthest(), self.cutouts.as_deref());
         stack.clear();
         if !self.nodes.is_empty() {
             stack.push((0, 0.0));
@@ -155,7 +167,7 @@ impl WideBvh {
                         stack.swap(at - 1, at);
                         at -= 1;
                     }
-                } else if packet.triangles::<FIRST>(&self.blocks[(child & !BLOCK) as usize]) {
+                } else if packet.triangles::<FIRST>(&self.blocks[(child & !BLOCK) as usize], cutouts) {
                     farthest = packet.farthest();
                     if farthest < 0.0 {
                         return;
@@ -167,11 +179,14 @@ impl WideBvh {
 }
 
 impl Block {
-    fn of(slots: &[u32], triangles: &[Triangle], index: &[u32]) -> Self {
-        let mut block = Self { corners: [[[0.0; 4]; 3]; 3], index: [NOTHING; 4], count: slots.len().min(4) };
+    fn of(slots: &[u32], triangles: &[Triangle], index: &[u32], cutouts: Option<&Cutouts>) -> Self {
+        let count = slots.len().min(4) as u32;
+        let mut block = Self { corners: [[[0.0; 4]; 3]; 3], index: [NOTHING; 4], count, cut: 0 };
         for (k, &slot) in slots.iter().enumerate().take(4) {
             let Triangle { v0, v1, v2 } = triangles[slot as usize];
             block.index[k] = index[slot as usize];
+            let cut = cutouts.is_some_and(|cutouts| cutouts.has(block.index[k]));
+            block.cut |= u32::from(cut) << k;
             for (own, corner) in block.corners.iter_mut().zip([v0, v1, v2]) {
                 (0..3).for_each(|axis| own[axis][k] = corner[axis]);
             }

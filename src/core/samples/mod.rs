@@ -54,7 +54,6 @@ mod through;
 mod trace;
 pub mod visibility;
 
-use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -369,7 +368,7 @@ fn of_skin(
     done: impl Fn(u64) + Sync,
 ) -> (ViewSamples, Vec<(u32, Hit)>) {
     let n = scene.quality.samples_per_axis.max(1);
-    let hits = trace::trace(posed.seen(), posed.mesh, camera, n);
+    let hits = trace::trace(posed.rays, posed.mesh, camera, n);
     let surface = surface::Surface::new(scene, posed, camera);
     let samples = group::pack(&hits, &surface, (camera.width, n * n), done);
     (samples, hits.plain)
@@ -385,9 +384,6 @@ pub fn asked_records(scene: &Scene, count: usize) -> SurfaceRecords {
 #[must_use]
 pub fn sample_hits(scene: &Scene, posed: &PosedMesh, rays: &RayMesh, camera: &Camera) -> Vec<Hit> {
     let n = scene.quality.samples_per_axis.max(1);
-    let hits = match posed.occluders() {
-        Cow::Borrowed(_) => trace::trace(rays, posed, camera, n),
-        Cow::Owned(_) => trace::trace(&RayMesh::new(&posed.positions, &posed.triangles), posed, camera, n),
-    };
+    let hits = trace::trace(rays, posed, camera, n);
     group::slots(&hits, camera.width)
 }

@@ -1,7 +1,6 @@
 //! A scene's mesh in one pose with all that its samples and texels are made of.
 
-use std::borrow::Cow;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
@@ -54,8 +53,6 @@ impl<'a> From<&'a Bake> for SurfaceBakes<'a> {
 pub struct PosedSurface<'a> {
     pub(super) mesh: &'a PosedMesh,
     pub(super) rays: &'a RayMesh,
-    /// All of the mesh, where it has parts that stand in no light's way: as cameras see it.
-    seen: OnceLock<RayMesh>,
     /// Open share of each vertex' hemisphere.
     pub(super) open: Option<Vec<f32>>,
     /// The coarser levels of the scene's maps, where its filter reads them.
@@ -136,26 +133,7 @@ impl<'a> PosedSurface<'a> {
     /// A mesh with the open share of each vertex' hemisphere, and nothing else.
     #[must_use]
     pub const fn bare(mesh: &'a PosedMesh, rays: &'a RayMesh, open: Option<Vec<f32>>) -> Self {
-        Self {
-            mesh,
-            rays,
-            seen: OnceLock::new(),
-            open,
-            mip_maps: None,
-            charts: Vec::new(),
-            supplies: Vec::new(),
-            lobes: None,
-        }
-    }
-
-    /// The mesh as cameras see it.
-    pub(super) fn seen(&self) -> &RayMesh {
-        match self.mesh.occluders() {
-            Cow::Borrowed(_) => self.rays,
-            Cow::Owned(_) => {
-                self.seen.get_or_init(|| RayMesh::new(&self.mesh.positions, &self.mesh.triangles))
-            }
-        }
+        Self { mesh, rays, open, mip_maps: None, charts: Vec::new(), supplies: Vec::new(), lobes: None }
     }
 
     /// The same, each vertex being of a chart of the UV atlas.

@@ -91,21 +91,6 @@ pub struct RestSurface {
 }
 
 impl PosedMesh {
-    /// Its triangles, of which those have no area that have holes or blend: they stand in no light's way.
-    #[must_use]
-    pub fn occluders(&self) -> Cow<'_, [[u32; 3]]> {
-        let open = |plain: &PlainParts, triangle: usize| plain.is_open(triangle as u32);
-        match &self.plain {
-            Some(plain) if (0..self.triangles.len()).any(|triangle| open(plain, triangle)) => {
-                let each = self.triangles.iter().enumerate();
-                Cow::Owned(
-                    each.map(|(i, &[a, b, c])| if open(plain, i) { [a; 3] } else { [a, b, c] }).collect(),
-                )
-            }
-            _ => Cow::Borrowed(&self.triangles),
-        }
-    }
-
     /// Its triangles, of which those that are not skin have no area: for what the skin's own texture coordinates are of.
     #[must_use]
     pub fn skin_triangles(&self) -> Cow<'_, [[u32; 3]]> {

@@ -115,7 +115,7 @@ impl PlainParts {
         self.materials.get(usize::from(place))
     }
 
-    /// Whether a triangle has holes or blends: it stands in no light's way.
+    /// Whether a triangle has holes or blends.
     #[must_use]
     pub fn is_open(&self, triangle: u32) -> bool {
         self.material(triangle).is_some_and(PlainMaterial::is_open)

@@ -1,12 +1,13 @@
 //! The materials of what is not skin: their numbers and pictures, bound one by one.
 
 use std::collections::HashMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 use wgpu::{
     AddressMode, BindGroup, BindGroupLayout, BindingResource, BindingType, BufferBindingType, BufferUsages,
-    FilterMode, Sampler, SamplerBindingType, SamplerDescriptor, ShaderStages, TextureSampleType, TextureView,
-    TextureViewDimension,
+    FilterMode, RenderPass, Sampler, SamplerBindingType, SamplerDescriptor, ShaderStages, TextureSampleType,
+    TextureView, TextureViewDimension,
 };
 
 use crate::compute;
@@ -18,7 +19,7 @@ use crate::texels;
 use crate::upload::texture;
 
 /// The materials, each bound.
-pub(super) struct Materials {
+pub(crate) struct Materials {
     layout: BindGroupLayout,
     bound: Vec<BindGroup>,
     bytes: u64,
@@ -36,7 +37,7 @@ impl Materials {
     ///
     /// # Errors
     /// When a picture is larger than the adapter takes.
-    pub(super) fn new(gpu: &Gpu, materials: &[PlainMaterial]) -> Result<Self, GpuError> {
+    pub(crate) fn new(gpu: &Gpu, materials: &[PlainMaterial]) -> Result<Self, GpuError> {
         let layout = layout(gpu);
         // In the place of pictures that a material has not.
         let white = PlainMap {
@@ -70,12 +71,17 @@ impl Materials {
         &self.layout
     }
 
-    /// That of a place.
-    pub(super) fn bound(&self, material: u16) -> Option<&BindGroup> {
-        self.bound.get(usize::from(material))
+    /// Draw corners, those of each material by its place.
+    pub(super) fn draw(&self, pass: &mut RenderPass<'_>, runs: &[(u16, Range<u32>)]) {
+        for (material, corners) in runs {
+            if let Some(bound) = self.bound.get(usize::from(*material)) {
+                pass.set_bind_group(1, bound, &[]);
+                pass.draw(corners.clone(), 0..1);
+            }
+        }
     }
 
-    pub(super) const fn bytes(&self) -> u64 {
+    pub(crate) const fn bytes(&self) -> u64 {
         self.bytes
     }
 }

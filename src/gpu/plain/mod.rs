@@ -5,9 +5,11 @@
 //! - `placed`: where their corners are
 //! - `light`: what reaches them; the lights and the sky
 //! - `materials`: what each part is drawn by
+//! - [`Casters`]: those that have holes or blend, in shadow maps
 //!
 //! No constant of the skin moves them. Where lights move or the environment turns, the renderer makes them anew.
 
+mod casters;
 mod light;
 mod materials;
 mod placed;
@@ -19,18 +21,17 @@ use std::sync::Arc;
 use wgpu::{
     BindGroupLayout, ColorTargetState, ColorWrites, FragmentState, MultisampleState,
     PipelineCompilationOptions, PipelineLayoutDescriptor, PrimitiveState, RenderPass, RenderPipeline,
-    RenderPipelineDescriptor, ShaderModuleDescriptor, ShaderSource, VertexAttribute, VertexBufferLayout,
-    VertexFormat, VertexState, VertexStepMode,
+    RenderPipelineDescriptor, ShaderModuleDescriptor, ShaderSource, VertexState,
 };
 
+pub(super) use self::casters::Casters;
 use self::light::Light;
-use self::materials::Materials;
-use self::placed::Placed;
-use self::text::module;
+pub(super) use self::materials::Materials;
+use self::placed::{Placed, layouts};
+use self::text::{module, placing};
 use super::constants::Values;
 use super::device::Gpu;
 use super::error::GpuError;
-use super::formats::vertex_format;
 use super::pipeline::nearest;
 use super::targets::Key;
 use super::upload::Uploads;
@@ -41,7 +42,7 @@ use crate::shader::Facts;
 pub(super) struct Plain {
     placed: Placed,
     light: Light,
-    materials: Materials,
+    materials: Arc<Materials>,
     /// Corners of each material, by its place.
     runs: Vec<(u16, Range<u32>)>,
     layouts: [BindGroupLayout; 3],
@@ -63,21 +64,21 @@ impl Plain {
     /// When the adapter does not take what they read.
     pub(super) fn new(gpu: &Gpu, facts: &Facts, uploads: &mut Uploads) -> Result<Option<Self>, GpuError> {
         let scene = Arc::clone(&uploads.content().scene);
-        let Some(parts) = &scene.mesh.plain else { return Ok(None) };
         let ordered = uploads.triangles();
         if ordered.plain.is_empty() {
             return Ok(None);
         }
-        let first = ordered.skin;
+        let (first, end) = (ordered.skin, ordered.corners.len() as u32);
         let corners = |triangles: &Range<u32>| 3 * (triangles.start - first)..3 * (triangles.end - first);
         let runs =
             ordered.plain.iter().map(|(material, triangles)| (*material, corners(triangles))).collect();
         let light =
             Light::new(gpu, &scene, &uploads.content().params, ordered.order[first as usize..].to_vec())?;
-        let placed = Placed::new(gpu, facts, uploads)?;
-        let materials = Materials::new(gpu, &parts.materials)?;
-        let layouts = [placed.inputs.layout.clone(), light.layout().clone(), materials.layout().clone()];
-        uploads.add_bytes(placed.bytes() + light.bytes() + materials.bytes());
+        let plan = placing(facts).map_err(|error| GpuError::Plan(error.to_string()))?;
+        let placed = Placed::new(gpu, plan, first..end, uploads)?;
+        let materials = uploads.materials(gpu)?;
+        let layouts = [placed.inputs.layout.clone(), materials.layout().clone(), light.layout().clone()];
+        uploads.add_bytes(placed.bytes() + light.bytes());
         gpu.check()?;
         Ok(Some(Self { placed, light, materials, runs, layouts }))
     }
@@ -92,25 +93,13 @@ impl Plain {
             label: Some("plain"),
             source: ShaderSource::Wgsl(wgsl.into()),
         });
-        let layouts: Vec<_> = self.layouts.iter().map(Some).collect();
+        let groups: Vec<_> = self.layouts.iter().map(Some).collect();
         let layout = device.create_pipeline_layout(&PipelineLayoutDescriptor {
             label: Some("plain"),
-            bind_group_layouts: &layouts,
+            bind_group_layouts: &groups,
             immediate_size: 0,
         });
-        let read = plan.attributes.iter().map(|&a| (vertex_format(a), a.bytes()));
-        let read: Vec<(VertexFormat, u64)> = read.chain([(VertexFormat::Float32x4, 16)]).collect();
-        let attribute =
-            |(shader_location, &(format, _))| [VertexAttribute { format, offset: 0, shader_location }];
-        let attributes: Vec<[VertexAttribute; 1]> = (0_u32..).zip(&read).map(attribute).collect();
-        let step_mode = VertexStepMode::Vertex;
-        let buffers: Vec<_> = attributes
-            .iter()
-            .zip(&read)
-            .map(|(attributes, &(_, array_stride))| {
-                Some(VertexBufferLayout { array_stride, step_mode, attributes })
-            })
-            .collect();
+        let attributes = self.placed.attributes();
         let target = |&format| Some(ColorTargetState { format, blend: None, write_mask: ColorWrites::ALL });
         let targets: Vec<_> = formats.iter().map(target).collect();
         let constants = [("multisamples", f64::from(multisamples))];
@@ -121,7 +110,7 @@ impl Plain {
                 module: &module,
                 entry_point: Some("plain_vertex"),
                 compilation_options: PipelineCompilationOptions::default(),
-                buffers: &buffers,
+                buffers: &layouts(&attributes),
             },
             // Both sides of a triangle are seen, as on the CPU.
             primitive: PrimitiveState { cull_mode: None, ..PrimitiveState::default() },
@@ -157,15 +146,8 @@ impl Plain {
     pub(super) fn draw(&self, pass: &mut RenderPass<'_>, pipeline: &RenderPipeline) {
         pass.set_pipeline(pipeline);
         pass.set_bind_group(0, &self.placed.inputs.bound, &[]);
-        pass.set_bind_group(1, self.light.bound(), &[]);
-        for (slot, buffer) in (0_u32..).zip(self.placed.buffers()) {
-            pass.set_vertex_buffer(slot, buffer.slice(..));
-        }
-        for (material, corners) in &self.runs {
-            if let Some(bound) = self.materials.bound(*material) {
-                pass.set_bind_group(2, bound, &[]);
-                pass.draw(corners.clone(), 0..1);
-            }
-        }
+        pass.set_bind_group(2, self.light.bound(), &[]);
+        self.placed.set_buffers(pass);
+        self.materials.draw(pass, &self.runs);
     }
 }

@@ -2,17 +2,21 @@
 //! fragment knows its triangle and where in it it lies.
 
 use std::collections::HashMap;
+use std::ops::Range;
 
-use wgpu::{Buffer, BufferUsages};
+use wgpu::{
+    BindGroup, Buffer, BufferUsages, RenderPass, VertexAttribute, VertexBufferLayout, VertexFormat,
+    VertexStepMode,
+};
 
-use super::text::placing;
-use crate::constants::Values;
+use crate::constants::{Values, block_bytes};
 use crate::device::Gpu;
 use crate::error::GpuError;
-use crate::pipeline::{Inputs, Stages};
+use crate::formats::vertex_format;
+use crate::pipeline::{self, Inputs, Stages};
 use crate::scene::Scene;
 use crate::scene::mesh::Mesh;
-use crate::shader::{Attribute, Facts, Resource};
+use crate::shader::{Attribute, Plan, Resource};
 use crate::upload::{Bound, Uploads, buffer, storage};
 use crate::vertices;
 
@@ -23,23 +27,27 @@ pub(super) struct Placed {
     tints: Buffer,
     /// What the plan reads beside attributes, in its order.
     resources: Vec<(Resource, Buffer)>,
-    /// The parts' triangles.
+    /// Their triangles.
     triangles: Vec<[u32; 3]>,
     /// The morph targets that are summed.
     targets: Vec<usize>,
 }
 
 impl Placed {
-    /// Those of the scene that `uploads` are of.
+    /// Those of the scene that `uploads` are of, in that range of its triangles, placed by a plan.
     ///
     /// # Errors
     /// When they are more than the adapter takes.
-    pub(super) fn new(gpu: &Gpu, facts: &Facts, uploads: &Uploads) -> Result<Self, GpuError> {
+    pub(super) fn new(
+        gpu: &Gpu,
+        plan: Plan,
+        triangles: Range<u32>,
+        uploads: &Uploads,
+    ) -> Result<Self, GpuError> {
         let scene = &*uploads.content().scene;
-        let ordered = uploads.triangles();
-        let (triangles, order) = (ordered.of_parts().to_vec(), &ordered.order[ordered.skin as usize..]);
+        let (ordered, range) = (uploads.triangles(), triangles.start as usize..triangles.end as usize);
+        let (triangles, order) = (ordered.corners[range.clone()].to_vec(), &ordered.order[range]);
         let targets = uploads.targets().to_vec();
-        let plan = placing(facts).map_err(|error| GpuError::Plan(error.to_string()))?;
         let split = corners(&scene.mesh, &triangles);
         let attributes = plan.attributes.iter().map(|&attribute| {
             let bytes = vertices::attribute(attribute, &split, None, &HashMap::new());
@@ -51,7 +59,7 @@ impl Placed {
             Ok((resource, storage(gpu, resource.name(), bytemuck::cast_slice(&rows))?))
         });
         let resources = resources.collect::<Result<Vec<_>, GpuError>>()?;
-        let bound: Vec<Bound> = resources.iter().map(|(_, buffer)| Bound::Buffer(buffer.clone())).collect();
+        let bound = bound(&resources);
         let tints = tints(scene, order);
         let tints = buffer(gpu, "tints", bytemuck::cast_slice(&tints), BufferUsages::VERTEX)?;
         let inputs = Inputs::of(gpu, plan, attributes, &bound, Stages::Raster);
@@ -77,8 +85,34 @@ impl Placed {
         }
     }
 
+    /// A uniform block for the plan's constants beside its own, bound with what else it reads.
+    pub(super) fn constants(&self, gpu: &Gpu) -> (Buffer, BindGroup) {
+        let plan = &self.inputs.plan;
+        let block = vec![0; block_bytes(&plan.constants, plan.facts.morphs)];
+        let buffer = gpu.buffer("constants", &block, BufferUsages::UNIFORM);
+        let bound = pipeline::bind(gpu, &self.inputs.layout, Some(&buffer), &bound(&self.resources));
+        (buffer, bound)
+    }
+
+    /// How each buffer is read, and the bytes of a corner in it.
+    pub(super) fn attributes(&self) -> Vec<([VertexAttribute; 1], u64)> {
+        let read = self.inputs.plan.attributes.iter().map(|&a| (vertex_format(a), a.bytes()));
+        let tint = (VertexFormat::Float32x4, 16);
+        let attribute = |(shader_location, (format, bytes))| {
+            ([VertexAttribute { format, offset: 0, shader_location }], bytes)
+        };
+        (0_u32..).zip(read.chain([tint])).map(attribute).collect()
+    }
+
+    /// Have a pass read them.
+    pub(super) fn set_buffers(&self, pass: &mut RenderPass<'_>) {
+        for (slot, buffer) in (0_u32..).zip(self.buffers()) {
+            pass.set_vertex_buffer(slot, buffer.slice(..));
+        }
+    }
+
     /// What is read of each corner, in the order of the shader's locations.
-    pub(super) fn buffers(&self) -> impl Iterator<Item = &Buffer> {
+    fn buffers(&self) -> impl Iterator<Item = &Buffer> {
         self.inputs.attributes.iter().chain([&self.tints])
     }
 
@@ -86,6 +120,18 @@ impl Placed {
         let resources = self.resources.iter().map(|(_, buffer)| buffer);
         self.buffers().chain(resources).map(Buffer::size).sum()
     }
+}
+
+/// The layouts of such buffers.
+pub(super) fn layouts(attributes: &[([VertexAttribute; 1], u64)]) -> Vec<Option<VertexBufferLayout<'_>>> {
+    let step_mode = VertexStepMode::Vertex;
+    let each = attributes.iter();
+    each.map(|(attributes, bytes)| Some(VertexBufferLayout { array_stride: *bytes, step_mode, attributes }))
+        .collect()
+}
+
+fn bound(resources: &[(Resource, Buffer)]) -> Vec<Bound> {
+    resources.iter().map(|(_, buffer)| Bound::Buffer(buffer.clone())).collect()
 }
 
 /// A mesh of those triangles alone, which share no vertices.

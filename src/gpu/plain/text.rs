@@ -1,5 +1,5 @@
 //! The text of the shaders that draw what is not skin: the planned vertex stage that places the mesh, and the fragments of
-//! `wgsl/plain.wgsl`.
+//! `wgsl/plain.wgsl` or, in shadow maps, of `wgsl/casters.wgsl`.
 
 use std::fmt::Write as _;
 
@@ -19,8 +19,21 @@ pub(super) const fn rows_of(lights: usize) -> usize {
 /// is asked for so that the eye is among the constants.
 pub(super) fn placing(facts: &Facts) -> Result<Plan, PlanError> {
     let handed = [("vertex_position", "vec3f"), ("vertex_normal", "vec3f"), ("vertex_uv", "vec2f")];
+    vertex_plan(facts, &["clip", "vertex_view"], &handed)
+}
+
+/// That of shadow maps: fragments look alpha up.
+pub(super) fn casting(facts: &Facts) -> Result<Plan, PlanError> {
+    vertex_plan(facts, &["clip"], &[("vertex_uv", "vec2f")])
+}
+
+fn vertex_plan(
+    facts: &Facts,
+    goals: &[&'static str],
+    handed: &[(&'static str, &'static str)],
+) -> Result<Plan, PlanError> {
     let goals: Vec<&'static str> =
-        ["clip", "vertex_view"].into_iter().chain(handed.map(|(name, _)| name)).collect();
+        goals.iter().copied().chain(handed.iter().map(|&(name, _)| name)).collect();
     let plan = Plan::search(&raster(facts), &goals, &[], &[])?;
     Ok(Plan { varyings: handed.to_vec(), ..plan })
 }
@@ -38,21 +51,41 @@ pub(super) struct Shining {
 /// `plain_fragment`. After the plan's attributes the vertex stage reads a factor on the base colour.
 pub(super) fn module(plan: &Plan, shining: Shining, show: Show, hazy: bool, multisampled: bool) -> String {
     let Shining { sky, lights } = shining;
-    let mut wgsl = plan.vertex_function("placed");
+    let mut wgsl = vertex_stage(plan, "plain_vertex", "PlainVaryings");
     let _ = write!(
         wgsl,
-        "\nconst SKY = {sky};\nconst LIGHTS = {lights}u;\n// Rows of a place, those of the lights after {OWN_ROWS} others.\n\
-         const ROWS = {}u;\nconst LIGHT_ROWS = {OWN_ROWS}u;\n\n@vertex\n\
-         fn plain_vertex(vertex: Vertex, @location({}) tint: vec4f) -> PlainVaryings {{\n    \
-         let at = placed(vertex);\n    let corner = vertex.vertex_index % 3u;\n    \
-         let shares = vec2f(f32(corner == 1u), f32(corner == 2u));\n    \
-         return PlainVaryings(at.clip, at.vertex_position, at.vertex_normal, at.vertex_uv, tint, shares, \
-         vertex.vertex_index / 3u);\n}}\n\n",
+        "const SKY = {sky};\nconst LIGHTS = {lights}u;\n// Rows of a place, those of the lights after {OWN_ROWS} others.\n\
+         const ROWS = {}u;\nconst LIGHT_ROWS = {OWN_ROWS}u;\n\n",
         OWN_ROWS + rows_of(lights),
-        plan.attributes.len(),
     );
+    wgsl.push_str(include_str!("../wgsl/alpha.wgsl"));
     wgsl.push_str(include_str!("../wgsl/plain.wgsl"));
     wgsl.push_str(&fragment(show, hazy, multisampled));
+    wgsl
+}
+
+/// The module that draws into shadow maps; its entry points are `cast_vertex` and `cast_fragment`. The vertex stage reads
+/// what that of [`module`] does.
+pub(super) fn cast_module(plan: &Plan) -> String {
+    let mut wgsl = vertex_stage(plan, "cast_vertex", "CastVaryings");
+    wgsl.push_str(include_str!("../wgsl/alpha.wgsl"));
+    wgsl.push_str(include_str!("../wgsl/casters.wgsl"));
+    wgsl
+}
+
+/// The vertex stage: a function of that name that returns `varyings`, which hold what the plan hands over, the factor on
+/// the base colour, and where in which triangle they are.
+fn vertex_stage(plan: &Plan, name: &str, varyings: &str) -> String {
+    let mut wgsl = plan.vertex_function("placed");
+    let handed: String = plan.varyings.iter().map(|(name, _)| format!("at.{name}, ")).collect();
+    let _ = write!(
+        wgsl,
+        "\n@vertex\nfn {name}(vertex: Vertex, @location({}) tint: vec4f) -> {varyings} {{\n    \
+         let at = placed(vertex);\n    let corner = vertex.vertex_index % 3u;\n    \
+         let shares = vec2f(f32(corner == 1u), f32(corner == 2u));\n    \
+         return {varyings}(at.clip, {handed}tint, shares, vertex.vertex_index / 3u);\n}}\n\n",
+        plan.attributes.len(),
+    );
     wgsl
 }
 
@@ -90,9 +123,18 @@ mod tests {
 
     use super::*;
 
+    fn check(text: &str) {
+        let parsed = parse_str(text).unwrap_or_else(|error| panic!("{}", error.emit_to_string(text)));
+        let checked = Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&parsed);
+        checked.unwrap_or_else(|error| panic!("{}", error.emit_to_string(text)));
+    }
+
     #[test]
     fn every_module_is_valid() {
         let moves = Facts { morphs: 2, bones: true, ..Facts::default() };
+        for facts in [Facts::default(), moves] {
+            check(&cast_module(&casting(&facts).unwrap()));
+        }
         let plans = [Facts::default(), moves].map(|facts| placing(&facts).unwrap());
         let ways = [(false, false), (true, false), (false, true), (true, true)];
         for (plan, lights) in plans.iter().flat_map(|plan| [0, 1, 5].map(|lights| (plan, lights))) {
@@ -100,11 +142,7 @@ mod tests {
                 [Show::Lit, Show::Hidden].into_iter().flat_map(|show| ways.map(|way| (show, way)))
             {
                 let shining = Shining { sky: lights == 0, lights };
-                let text = module(plan, shining, show, hazy, multisampled);
-                let parsed =
-                    parse_str(&text).unwrap_or_else(|error| panic!("{}", error.emit_to_string(&text)));
-                let checked = Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&parsed);
-                checked.unwrap_or_else(|error| panic!("{}", error.emit_to_string(&text)));
+                check(&module(plan, shining, show, hazy, multisampled));
             }
         }
     }

@@ -4,12 +4,13 @@
 //!
 //! The mesh is placed by the plan's own vertex stage. Both sides of a triangle are drawn, as both are seen and stop rays: a
 //! mesh may be open. Backs alone would need no bias on closed bodies, but light comes through where a body is thin: on a
-//! scanned head they are off by half as much again. How fragments read the maps stands in the rules
-//! (`rules/lib/shadow.wgsl` and `rules/family/shadow.wgsl`).
+//! scanned head they are off by half as much again. What has holes or blends is drawn after the rest, by its material
+//! ([`Casters`]). How fragments read the maps stands in the rules (`rules/lib/shadow.wgsl` and
+//! `rules/family/shadow.wgsl`).
 
 mod views;
 
-use glam::{DMat4, Vec3};
+use glam::DMat4;
 use wgpu::{
     AddressMode, BindGroup, Buffer, BufferUsages, CommandEncoder, CompareFunction, Extent3d, FilterMode,
     IndexFormat, LoadOp, Operations, RenderPassDepthStencilAttachment, RenderPassDescriptor, RenderPipeline,
@@ -24,10 +25,12 @@ use super::device::Gpu;
 use super::error::{GpuError, Oversized};
 use super::geometry::outline;
 use super::pipeline::{self, Outputs, Stages};
+use super::plain::Casters;
 use super::targets::DEPTH;
 use super::timing::Timer;
 use super::upload::{Bound, Uploads};
 use crate::scene::ShadowMaps;
+use crate::scene::mesh::Mesh;
 use crate::shader::{Constant, Facts, Resource};
 
 /// The shadow maps of a scene on the device.
@@ -41,8 +44,10 @@ pub(super) struct Maps {
     pipeline: RenderPipeline,
     constants: Vec<Constant>,
     attributes: Vec<Buffer>,
-    /// The triangles that stand in light's way, and how many indices they have.
+    /// The triangles that stop all light, and how many indices they have.
     indices: (Buffer, u32),
+    /// Those that light passes in places.
+    casters: Option<Casters>,
     /// Whether they do not show the present pose.
     stale: bool,
     drawn: u64,
@@ -88,6 +93,7 @@ impl Maps {
         let rows = gpu.buffer("shadow views", &vec![0; 16 * ROWS * count.max(1)], BufferUsages::STORAGE);
         gpu.check()?;
         let indices = (uploads.indices().clone(), 3 * uploads.triangles().blocking);
+        let casters = Casters::new(gpu, facts, uploads, count)?;
         let constants = plan.constants;
         let (stale, drawn) = (true, 0);
         Ok(Self {
@@ -100,6 +106,7 @@ impl Maps {
             constants,
             attributes,
             indices,
+            casters,
             stale,
             drawn,
         })
@@ -138,10 +145,14 @@ impl Maps {
         ]
     }
 
-    /// Fit the maps to a mesh whose vertices lie there. They are drawn with the next frame.
-    pub(super) fn set_pose(&mut self, gpu: &Gpu, places: &[Vec3]) {
+    /// Fit the maps to a pose of the mesh. They are drawn with the next frame.
+    pub(super) fn set_mesh(&mut self, gpu: &Gpu, mesh: &Mesh) {
+        if let Some(casters) = &self.casters {
+            casters.set_mesh(gpu, mesh);
+        }
+        let places = mesh.pose().positions;
         let mut rows = Vec::with_capacity(ROWS * self.layers.len());
-        let views = self.lights.iter().flat_map(|light| views(light, &self.settings, places));
+        let views = self.lights.iter().flat_map(|light| views(light, &self.settings, &places));
         for (layer, view) in self.layers.iter_mut().zip(views) {
             layer.matrix = view.matrix;
             rows.extend(view.rows);
@@ -161,7 +172,7 @@ impl Maps {
         if !std::mem::take(&mut self.stale) {
             return;
         }
-        for layer in &self.layers {
+        for (i, layer) in self.layers.iter().enumerate() {
             let block = constants::outline_block(&self.constants, &layer.matrix, morph_weights);
             gpu.queue.write_buffer(&layer.constants, 0, bytemuck::cast_slice(&block));
             let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
@@ -182,6 +193,9 @@ impl Maps {
             let (indices, count) = &self.indices;
             pass.set_index_buffer(indices.slice(..), IndexFormat::Uint32);
             pass.draw_indexed(0..*count, 0, 0..1);
+            if let Some(casters) = &self.casters {
+                casters.draw(gpu, &mut pass, i, (&layer.matrix, morph_weights));
+            }
         }
         self.drawn += self.layers.len() as u64;
     }

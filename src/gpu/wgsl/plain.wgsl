@@ -35,31 +35,20 @@ struct Frame {
     brightness: f32,
 }
 
-struct Material {
-    base_color: vec4f,
-    // The last: below this alpha there is a hole.
-    emission: vec4f,
-    // Metal and roughness; then 0 where alpha does nothing, 1 where it cuts holes, 2 where it is the share that is seen.
-    factors: vec4f,
-}
-
 // Of each place two rows of the first eight harmonics of each side; one of both last ones, and of which sides any eye sees
 // (1 or 0); and those of the lights.
-@group(1) @binding(0) var<storage, read> rows: array<vec4f>;
+@group(2) @binding(0) var<storage, read> rows: array<vec4f>;
 // Of each triangle the number of its first place, and the steps along a side.
-@group(1) @binding(1) var<storage, read> spread: array<vec2u>;
-@group(1) @binding(2) var<storage, read> lights: array<Light>;
+@group(2) @binding(1) var<storage, read> spread: array<vec2u>;
+@group(2) @binding(2) var<storage, read> lights: array<Light>;
 // Each level is the mean of the one before. Without an environment a level of black.
-@group(1) @binding(3) var sky: texture_cube<f32>;
-@group(1) @binding(4) var sky_sampler: sampler;
-@group(1) @binding(5) var<uniform> frame: Frame;
-@group(2) @binding(0) var<uniform> material: Material;
-@group(2) @binding(1) var color_map: texture_2d<f32>;
-@group(2) @binding(2) var color_sampler: sampler;
-@group(2) @binding(3) var roughness_map: texture_2d<f32>;
-@group(2) @binding(4) var roughness_sampler: sampler;
-@group(2) @binding(5) var emission_map: texture_2d<f32>;
-@group(2) @binding(6) var emission_sampler: sampler;
+@group(2) @binding(3) var sky: texture_cube<f32>;
+@group(2) @binding(4) var sky_sampler: sampler;
+@group(2) @binding(5) var<uniform> frame: Frame;
+@group(1) @binding(3) var roughness_map: texture_2d<f32>;
+@group(1) @binding(4) var roughness_sampler: sampler;
+@group(1) @binding(5) var emission_map: texture_2d<f32>;
+@group(1) @binding(6) var emission_sampler: sampler;
 
 struct Surface {
     diffuse: vec3f,
@@ -93,12 +82,8 @@ fn unit_or_zero(v: vec3f) -> vec3f {
     return normalize_or(v, vec3f(0.0));
 }
 
-fn base_color(at: PlainVaryings) -> vec4f {
-    return material.base_color * textureSampleLevel(color_map, color_sampler, at.uv, 0.0) * at.tint;
-}
-
 fn surface(at: PlainVaryings) -> Surface {
-    let base = clamp(base_color(at).rgb, vec3f(0.0), vec3f(1.0));
+    let base = clamp(base_color(at.uv, at.tint).rgb, vec3f(0.0), vec3f(1.0));
     let read = textureSampleLevel(roughness_map, roughness_sampler, at.uv, 0.0);
     let metal = clamp(material.factors.x * read.b, 0.0, 1.0);
     let roughness = clamp(material.factors.y * read.g, 0.0, 1.0);
@@ -279,12 +264,6 @@ fn radiance(at: PlainVaryings, plane: vec3f) -> vec3f {
     return select(vec3f(0.0), max(sum, vec3f(0.0)), is_finite(sum));
 }
 
-fn hashed(x: u32) -> u32 {
-    var h = (x ^ (x >> 16u)) * 0x85ebca6bu;
-    h = (h ^ (h >> 13u)) * 0xc2b2ae35u;
-    return h ^ (h >> 16u);
-}
-
 // Above this alpha the kth of a pixel's samples shows the layer: even over the pixel's, in an order of each triangle's
 // own, so that the mean over them is blended in any order (Enderton et al. 2010, Stochastic Transparency, stratified).
 fn threshold(k: u32, count: u32, seed: u32) -> f32 {
@@ -303,7 +282,7 @@ fn samples_shown(at: PlainVaryings) -> u32 {
     if (material.factors.z < 0.5) {
         return all;
     }
-    let alpha = clamp(base_color(at).a, 0.0, 1.0);
+    let alpha = clamp(base_color(at.uv, at.tint).a, 0.0, 1.0);
     if (material.factors.z < 1.5) {
         return select(0u, all, alpha >= material.emission.a);
     }

@@ -95,21 +95,6 @@ fn alpha_cuts_holes_or_blends_and_every_layer_adds_up() {
     }
 }
 
-#[test]
-fn holes_and_veils_cast_no_shadow_in_shadow_maps() {
-    let Some(gpu) = gpu() else { return };
-    let lamp = "[[light]]\nname = \"plain_aside\"\ntype = \"directional\"\ndirection = [1, 0, -0.7]\nirradiance = [3.0, 3.0, 3.0]\n";
-    let lit = SCENE
-        .replace("\"diffuse\"", "\"lights\", \"shadows\"")
-        .replace("[environment]\nfile = \"env.exr\"\n", lamp);
-    for (mode, shaded) in [("OPAQUE", true), ("BLEND", false), ("MASK", false)] {
-        let eye = json!({"name": "Eye", "alphaMode": mode});
-        let image = on_gpu(gpu, &baked(&folder(&eye, &lit)), EXACT);
-        let row: Vec<f32> = (0..16).map(|x| image.rgb[8 * 16 + x][0]).collect();
-        assert!(row[2] > 0.1 && if shaded { row[13] < 1e-6 } else { row[13] > 0.1 }, "{mode}: {row:?}");
-    }
-}
-
 /// A sky that is red on the right and green on the left.
 fn two_coloured() -> Vec<u8> {
     exr(

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may stop where the tests themselves would")]
 
+mod cutouts;
 mod drawn;
 mod pictures;
 mod shapes;

@@ -74,8 +74,8 @@ fn behind_many_layers_the_skin_is_no_hole() {
 fn bakes_are_kept_apart_by_what_stands_in_the_way() {
     let cache = tempfile::tempdir().unwrap();
     let scene = SCENE.replace("\"diffuse\"", "\"diffuse\", \"occlusion\"");
-    let open = |mode: &str, scene: &str| {
-        let eye = json!({"name": "Eye", "alphaMode": mode, "alphaCutoff": 0.5});
+    let open = |mode: &str, alpha: f64, scene: &str| {
+        let eye = json!({"name": "Eye", "alphaMode": mode, "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, alpha]}});
         // As large as the skin.
         let folder = edited(&eye, scene, |mesh, _| mesh["nodes"][1]["scale"] = json!([1, 1, 1]));
         let options = PrepareOptions { cache: Some(cache.path().to_owned()), ..PrepareOptions::default() };
@@ -83,12 +83,14 @@ fn bakes_are_kept_apart_by_what_stands_in_the_way() {
         baked.occlusion.as_ref().unwrap().base[0]
     };
     let all_skin = scene.replace("skin = [\"Skin\"]\n", "");
-    let (closed, with_holes) = (open("OPAQUE", &scene), open("MASK", &scene));
+    // The cutoff is a half where a material names none.
+    let (closed, with_holes) = (open("OPAQUE", 0.4, &scene), open("MASK", 0.4, &scene));
     assert!((with_holes - closed).abs() > 0.05, "{with_holes} and {closed}");
-    // The same again, from what is kept; and a mesh without parts has what the closed part has.
-    assert_eq!(open("OPAQUE", &scene), closed);
-    assert_eq!(open("MASK", &scene), with_holes);
-    assert_eq!(open("MASK", &all_skin), closed);
+    // The same again, from what is kept; alpha alone is another bake; and a mesh without parts has what the closed part has.
+    assert_eq!(open("OPAQUE", 0.4, &scene), closed);
+    assert_eq!(open("MASK", 0.4, &scene), with_holes);
+    assert_eq!(open("MASK", 0.6, &scene), closed);
+    assert_eq!(open("MASK", 0.4, &all_skin), closed);
 }
 
 #[test]
