@@ -83,11 +83,11 @@ fn registered(mut loaded: Loaded, mistakes: &[([f64; 2], [f64; 3], f64)]) -> (Ba
 fn cameras_of_the_built_in_scene_are_found_again() {
     let folder = tempfile::tempdir().unwrap();
     let path = skinfit::built_in_scene(folder.path()).unwrap();
-    // Some five pixels each: a shift, a turn, a field of view, and some of all.
+    // Five pixels and more each: of a shift, a turn, and a field of view.
     let mistakes = [
-        ([4.0, -3.0], [0.0; 3], 1.0),
-        ([0.0, 0.0], [1.5, -2.0, 1.0], 1.0),
-        ([1.5, 2.0], [-0.8, 1.0, 0.5], 1.02),
+        ([6.0, -3.0], [1.0, 1.0, 0.0], 1.02),
+        ([3.0, 3.0], [1.5, -2.0, 1.0], 0.98),
+        ([3.5, 3.0], [-1.5, 1.5, 0.8], 1.02),
     ];
     let (baked, cameras) = registered(read(&path), &mistakes);
     assert_eq!(cameras.len(), 3);
@@ -97,11 +97,11 @@ fn cameras_of_the_built_in_scene_are_found_again() {
         let of = if moved.view == "profile" { "profile" } else { "others" };
         crate::figures::measured(&format!("registration {of} start"), start[0]);
         crate::figures::measured(&format!("registration {of} end"), end[0]);
-        // A tenth of a pixel, from some five; but a profile is turned about its vertical axis without a change of its
-        // silhouette, and of the built-in head's smooth cheek little but shading tells.
-        let bounds = if moved.view == "profile" { [0.25, 2.5] } else { [0.1, 0.3] };
-        assert!(start[0] > 2.0 && end[0] < bounds[0], "{}: {start:?} -> {end:?}", moved.view);
-        assert!(end[1] < bounds[1] && moved.settled, "{}: {end:?}", moved.view);
+        // A tenth of a pixel. A profile is turned about its vertical axis without a change of its silhouette, which shows
+        // where it is nearest.
+        let most = if moved.view == "profile" { 1.0 } else { 0.3 };
+        assert!(start[0] > 5.0 && end[0] < 0.1, "{}: {start:?} -> {end:?}", moved.view);
+        assert!(end[1] < most && moved.settled, "{}: {end:?}", moved.view);
         let told = moved.told("scene.toml");
         assert!(baked.warnings.iter().any(|warning| warning.ends_with(&told[10..])), "{told}");
     }
@@ -118,7 +118,7 @@ fn cameras_of_path_traced_heads_end_at_the_same_place_from_anywhere_near() {
         loaded
     };
     let (baked, from_truth) = registered(profile(), &[([0.0; 2], [0.0; 3], 1.0)]);
-    let (_, from_aside) = registered(profile(), &[([2.0, 2.0], [0.4, -0.6, 0.4], 0.985)]);
+    let (_, from_aside) = registered(profile(), &[([4.0, 3.5], [0.8, -1.0, 0.7], 0.985)]);
     let (here, there) = (&from_truth[0], &from_aside[0]);
     let start = apart(&baked, &there[0], &there[1]);
     let bias = apart(&baked, &here[0], &here[2]);
@@ -132,7 +132,7 @@ fn cameras_of_path_traced_heads_end_at_the_same_place_from_anywhere_near() {
     let found = apart(&baked, &there[0], &there[2]);
     crate::figures::measured("registration traced start", start[0]);
     crate::figures::measured("registration traced end", found[0]);
-    assert!(start[0] > 2.0 && end[0] < 0.2, "{start:?} -> {end:?}");
+    assert!(start[0] > 5.0 && end[0] < 0.1, "{start:?} -> {end:?}");
     assert!(bias[0] < 0.1 && found[0] < 0.1, "{bias:?} {found:?}");
 }
 

@@ -10,7 +10,8 @@ use crate::scene::view::{Camera, View};
 pub(super) struct Picture {
     pub(super) width: usize,
     pub(super) height: usize,
-    pub(super) rgb: Vec<[f32; 3]>,
+    /// What it is the sum of: of a drawn one each term's image, of a target the target.
+    pub(super) layers: Vec<Vec<[f32; 3]>>,
     /// `None` where nothing says what is covered.
     pub(super) alpha: Option<Vec<f32>>,
     /// What each pixel counts; empty where all count 1.
@@ -21,9 +22,10 @@ pub(super) struct Picture {
 
 impl Picture {
     pub(super) fn of(shaded: Shaded) -> Self {
-        let Image { width, height, rgb, alpha, .. } = shaded.image;
+        let Image { width, height, alpha, .. } = shaded.image;
+        let layers = shaded.terms.into_iter().map(|(_, image)| image.rgb).collect();
         let plain = shaded.plain.map_or(Vec::new(), |plain| plain.alpha);
-        Self { width, height, rgb, alpha: Some(alpha), mask: Vec::new(), plain }
+        Self { width, height, layers, alpha: Some(alpha), mask: Vec::new(), plain }
     }
 
     /// A view's target.
@@ -34,7 +36,7 @@ impl Picture {
         Some(Self {
             width: view.camera.width as usize,
             height: view.camera.height as usize,
-            rgb: target.rgb.clone(),
+            layers: vec![target.rgb.clone()],
             alpha: target.alpha.as_ref().filter(shows).cloned(),
             mask: target.mask.clone().unwrap_or_default(),
             plain: Vec::new(),
@@ -53,10 +55,13 @@ impl Picture {
         };
         let places = || (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
         let plane = |of: &[f32]| places().map(|(x, y)| mean(x, y, &|i| of[i])).collect::<Vec<f32>>();
+        let colors = |of: &Vec<[f32; 3]>| -> Vec<[f32; 3]> {
+            places().map(|(x, y)| std::array::from_fn(|c| mean(x, y, &|i| of[i][c]))).collect()
+        };
         Self {
             width,
             height,
-            rgb: places().map(|(x, y)| std::array::from_fn(|c| mean(x, y, &|i| self.rgb[i][c]))).collect(),
+            layers: self.layers.iter().map(colors).collect(),
             alpha: self.alpha.as_ref().map(|alpha| plane(alpha)),
             mask: if self.mask.is_empty() { Vec::new() } else { plane(&self.mask) },
             plain: Vec::new(),
@@ -116,7 +121,7 @@ mod tests {
         let picture = Picture {
             width: 5,
             height: 4,
-            rgb: (0..20).map(|i| [i as f32, 1.0, 0.0]).collect(),
+            layers: vec![(0..20).map(|i| [i as f32, 1.0, 0.0]).collect()],
             alpha: Some(vec![0.5; 20]),
             mask: Vec::new(),
             plain: Vec::new(),
@@ -124,8 +129,8 @@ mod tests {
         let half = picture.reduced(2);
         assert_eq!((half.width, half.height), (2, 2));
         // Pixels 0, 1, 5 and 6; 12, 13, 17 and 18.
-        assert_eq!(half.rgb[0], [3.0, 1.0, 0.0]);
-        assert_eq!(half.rgb[3], [15.0, 1.0, 0.0]);
+        assert_eq!(half.layers[0][0], [3.0, 1.0, 0.0]);
+        assert_eq!(half.layers[0][3], [15.0, 1.0, 0.0]);
         assert_eq!(half.alpha, Some(vec![0.5; 4]));
     }
 }

@@ -1,9 +1,12 @@
 //! What a drawn image and a target differ by: in coverage, and in colour where both are covered wholly.
 //!
-//! The constants are not fitted yet, so that colours are compared but for a factor and a constant a channel, which are
-//! the best for that image. What the model's light is off by still pulls at a camera: over whole regions it is what a turn
+//! The constants are not fitted yet, so that colours are compared but for a weight of each term's and a constant a channel,
+//! which are the best for that image: of most terms the constants are such weights. What the model's light is off by still pulls at a camera: over whole regions it is what a turn
 //! would change. So at last the mean around each pixel is left out, and what is finer tells: texture, and creases.
 //! Each kind of difference weighs by how large it is where nothing moves it any more.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 use super::image::Picture;
 
@@ -15,6 +18,9 @@ const LEAST: f64 = 0.02;
 /// Colours that differ do so over whole regions: of each kind's weight the colours' is lessened by this, as so many
 /// pixels side by side say the same.
 const ALIKE: f64 = 0.25;
+
+/// A share of each layer's variance, by which layers that look alike share what they count.
+const RIDGE: f64 = 1e-6;
 
 /// Pixels to each side over which the mean is left out: wider, it is the shading's mistakes that are compared, and the turn
 /// of a path-traced profile is ten times as far off.
@@ -49,7 +55,7 @@ impl Residual {
     pub(super) fn new(drawn: &Picture, target: &Picture, colors: Colors) -> Self {
         let weight = |i: usize| f64::from(target.mask.get(i).copied().unwrap_or(1.0));
         let covered = |picture: &Picture, i: usize| picture.alpha.as_ref().map_or(1.0, |alpha| alpha[i]);
-        let count = target.rgb.len();
+        let count = target.width * target.height;
         let cover = match &target.alpha {
             Some(alpha) => {
                 let difference = |i: usize| weight(i) * f64::from(covered(drawn, i) - alpha[i]);
@@ -61,14 +67,10 @@ impl Residual {
         let both =
             |i: usize| skin(i) && weight(i) >= 1.0 && covered(drawn, i) > WHOLE && covered(target, i) > WHOLE;
         let compared: Vec<bool> = (0..count).map(both).collect();
-        let fitted: [Line; 3] = std::array::from_fn(|c| Line::through(drawn, target, &compared, c));
+        let fitted: Vec<Fitted> =
+            (0..3).into_par_iter().map(|c| Fitted::to(drawn, target, &compared, c)).collect();
         let color = |i: usize| {
-            compared[i].then(|| {
-                std::array::from_fn(|c| {
-                    let line = fitted[c];
-                    line.difference(f64::from(drawn.rgb[i][c]), f64::from(target.rgb[i][c]))
-                })
-            })
+            compared[i].then(|| std::array::from_fn(|c| fitted[c].difference(drawn, target, i, c)))
         };
         let color: Vec<Option<[f64; 3]>> = (0..count).map(color).collect();
         match colors {
@@ -149,50 +151,126 @@ fn detail(color: &[Option<[f64; 3]>], width: usize) -> Vec<Option<[f64; 3]>> {
     color.iter().enumerate().map(less_mean).collect()
 }
 
-/// The line that takes a channel's drawn values nearest to the target's, both in standard deviations of the target's.
-#[derive(Clone, Copy, Debug, Default)]
-struct Line {
-    factor: f64,
+/// What takes a channel of the drawn layers nearest to the target's; differences are in standard deviations of the target's.
+#[derive(Clone, Debug)]
+struct Fitted {
+    /// What each layer counts, none less than nothing.
+    weights: Vec<f64>,
     constant: f64,
     /// One over the target's standard deviation; 0 where it has none.
     scale: f64,
 }
 
-impl Line {
-    fn through(drawn: &Picture, target: &Picture, compared: &[bool], channel: usize) -> Self {
-        let mut sums = [0.0; 5];
-        for i in (0..compared.len()).filter(|&i| compared[i]) {
-            let (x, y) = (f64::from(drawn.rgb[i][channel]), f64::from(target.rgb[i][channel]));
-            for (sum, value) in sums.iter_mut().zip([1.0, x, y, x * x, x * y]) {
-                *sum += value;
+impl Fitted {
+    fn to(drawn: &Picture, target: &Picture, compared: &[bool], channel: usize) -> Self {
+        let count = drawn.layers.len();
+        // The target stands last.
+        let columns: Vec<&[[f32; 3]]> =
+            drawn.layers.iter().chain(&target.layers).map(Vec::as_slice).collect();
+        let places = || (0..compared.len()).filter(|&i| compared[i]);
+        let values = |i: usize| columns.iter().map(move |column| f64::from(column[i][channel]));
+        let pixels = places().count().max(1) as f64;
+        let mut means = DVector::<f64>::zeros(count + 1);
+        for i in places() {
+            means.iter_mut().zip(values(i)).for_each(|(mean, value)| *mean += value / pixels);
+        }
+        let mut covariance = DMatrix::<f64>::zeros(count + 1, count + 1);
+        let mut off = vec![0.0; count + 1];
+        for i in places() {
+            off.iter_mut().zip(values(i)).zip(&means).for_each(|((off, value), mean)| *off = value - mean);
+            for k in 0..=count {
+                (0..=k).for_each(|j| covariance[(j, k)] += off[j] * off[k] / pixels);
             }
         }
-        let [count, x, y, xx, xy] = sums;
-        if count < 2.0 {
-            return Self::default();
-        }
-        let (mean_x, mean_y) = (x / count, y / count);
-        let variance = xx / count - mean_x * mean_x;
-        let covariance = xy / count - mean_x * mean_y;
-        // Colours that go the other way are not the same surface's.
-        let factor = if variance > 0.0 { (covariance / variance).max(0.0) } else { 0.0 };
-        let spread = (0..compared.len()).filter(|&i| compared[i]).map(|i| {
-            let d = f64::from(target.rgb[i][channel]) - mean_y;
-            d * d
-        });
-        let deviation = (spread.sum::<f64>() / count).sqrt();
+        let weights = least_squares(&covariance);
+        let made: f64 = weights.iter().zip(&means).map(|(weight, mean)| weight * mean).sum();
+        let deviation = f64::sqrt(covariance[(count, count)]);
         let scale = if deviation > 0.0 { deviation.recip() } else { 0.0 };
-        Self { factor, constant: mean_y - factor * mean_x, scale }
+        Self { weights, constant: means[count] - made, scale }
     }
 
-    fn difference(&self, drawn: f64, target: f64) -> f64 {
-        self.scale * (self.factor * drawn + self.constant - target)
+    fn difference(&self, drawn: &Picture, target: &Picture, i: usize, channel: usize) -> f64 {
+        let layers = self.weights.iter().zip(&drawn.layers);
+        let made: f64 = layers.map(|(weight, layer)| weight * f64::from(layer[i][channel])).sum();
+        self.scale * (made + self.constant - f64::from(target.layers[0][i][channel]))
     }
+}
+
+/// The weights of all but the last which make the last best, by the upper half of their covariances. None is negative: colours
+/// that go the other way are not the same surface's. What would be is left out, the most negative first.
+fn least_squares(covariance: &DMatrix<f64>) -> Vec<f64> {
+    let count = covariance.ncols() - 1;
+    let mut weights = vec![0.0; count];
+    let mut kept: Vec<usize> = (0..count).filter(|&k| covariance[(k, k)] > 0.0).collect();
+    while !kept.is_empty() {
+        let among = |j: usize, k: usize| {
+            let (j, k) = (kept[j], kept[k]);
+            covariance[(j.min(k), j.max(k))] * if j == k { 1.0 + RIDGE } else { 1.0 }
+        };
+        let normal = DMatrix::from_fn(kept.len(), kept.len(), among);
+        let right = DVector::from_fn(kept.len(), |k, _| covariance[(kept[k], count)]);
+        let Some(found) = normal.cholesky().map(|factors| factors.solve(&right)) else { break };
+        let least = (0..kept.len()).min_by(|&a, &b| found[a].total_cmp(&found[b]));
+        match least.filter(|&k| found[k] < 0.0) {
+            Some(k) => drop(kept.remove(k)),
+            None => {
+                kept.iter().zip(found.iter()).for_each(|(&k, &weight)| weights[k] = weight);
+                break;
+            }
+        }
+    }
+    weights
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn weights_are_least_squares_without_negative_ones() {
+        // Of two layers that are uncorrelated, and their sum by 2 and 0.5; then of one that goes the other way.
+        let covariance =
+            |sign: f64| DMatrix::from_row_slice(3, 3, &[4.0, 0.0, 8.0, 0.0, 1.0, 0.5 * sign, 0.0, 0.0, 17.0]);
+        let near = |found: &[f64], wanted: [f64; 2]| {
+            // By the ridge, and what it is of 2.
+            found.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 4.0 * RIDGE)
+        };
+        let (both, one) = (least_squares(&covariance(1.0)), least_squares(&covariance(-1.0)));
+        assert!(near(&both, [2.0, 0.5]) && near(&one, [2.0, 0.0]) && one[1] == 0.0, "{both:?} {one:?}");
+        // Alike ones share; one that is the same everywhere counts nothing.
+        let alike = DMatrix::from_row_slice(
+            4,
+            4,
+            &[1.0, 1.0, 0.0, 3.0, 0.0, 1.0, 0.0, 3.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 9.0],
+        );
+        let found = least_squares(&alike);
+        // The condition is two over the ridge, so that roundings are far below it.
+        assert!(near(&found[..2], [1.5, 1.5]) && found[2] == 0.0, "{found:?}");
+        assert!(least_squares(&DMatrix::zeros(2, 2)) == [0.0]);
+    }
+
+    #[test]
+    fn terms_that_count_otherwise_leave_no_difference() {
+        let layer = |seed: usize| -> Vec<[f32; 3]> {
+            (0..64).map(|i| [0, 1, 2].map(|c| ((i * (7 + seed) + 5 * c) % (11 + 2 * seed)) as f32)).collect()
+        };
+        let layers = vec![layer(0), layer(1)];
+        let target = (0..64)
+            .map(|i| std::array::from_fn(|c| 0.5 * layers[0][i][c] + 3.0 * layers[1][i][c] + 0.25))
+            .collect();
+        let picture = |layers| Picture {
+            width: 8,
+            height: 8,
+            layers,
+            alpha: Some(vec![1.0; 64]),
+            mask: Vec::new(),
+            plain: Vec::new(),
+        };
+        let residual = Residual::new(&picture(layers), &picture(vec![target]), Colors::Whole);
+        // Shares of the target's deviation: the ridge takes its share of each weight, and these layers' deviations are
+        // at most some of the target's.
+        assert!(residual.color.iter().all(|d| d.unwrap().iter().all(|d| d.abs() < 10.0 * RIDGE)));
+    }
 
     #[test]
     fn detail_is_what_differs_from_the_compared_around_it() {
