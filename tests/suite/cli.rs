@@ -32,4 +32,5 @@ mod stages;
 mod suggest;
 mod sweeps;
 mod tradeoffs;
+mod vertex_streams;
 mod words;

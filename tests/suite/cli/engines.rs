@@ -1,11 +1,9 @@
-//! What engines take at once: cubes as textures, bakes as attributes of the mesh, and a C program that reads both a header
-//! and a cube.
+//! What engines take at once: cubes as textures, and a C program that reads both a header and a cube.
 
 use std::io::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use serde_json::Value;
 use skinfit::model::cube::Cube;
 use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
 use skinfit::model::evaluate::Setup;
@@ -28,7 +26,7 @@ fn half(bytes: &[u8]) -> f32 {
     if bits >> 15 == 1 { -size } else { size }
 }
 
-fn word(file: &[u8], at: usize) -> usize {
+pub(super) fn word(file: &[u8], at: usize) -> usize {
     u32::from_le_bytes(file[at..at + 4].try_into().unwrap()) as usize
 }
 
@@ -97,49 +95,6 @@ fn light_beyond_halves_is_told_and_other_kinds_of_file_are_refused() {
     assert!(ran.code == Some(0) && !ran.err.contains("half floats"), "{ran:?}");
     let ran = bake(&["--cubes", "ktx"]);
     assert!(ran.code == Some(2) && ran.err.contains("Did you mean `ktx2`?"), "{ran:?}");
-}
-
-/// The JSON of a .glb, and its binary chunk.
-fn glb(bytes: &[u8]) -> (Value, &[u8]) {
-    let json = word(bytes, 12);
-    let after = 20 + json + 8;
-    (serde_json::from_slice(&bytes[20..20 + json]).unwrap(), &bytes[after..])
-}
-
-#[test]
-fn the_open_share_is_an_attribute_of_a_mesh_that_draws_the_same_picture() {
-    let sandbox = Sandbox::with_shared_bakes();
-    sandbox.run(&["demo", "head"]).done();
-    sandbox.run(&["bake", "head/scene.toml", "-o", "baked", "--glb"]).done();
-    let file = sandbox.read("baked/vertices.glb");
-    let (json, binary) = glb(&file);
-    let attributes = &json["meshes"][0]["primitives"][0]["attributes"];
-    let accessor = &json["accessors"][attributes["_OCCLUSION"].as_u64().unwrap() as usize];
-    assert_eq!((&accessor["type"], &accessor["componentType"]), (&"SCALAR".into(), &5126.into()));
-    let view = &json["bufferViews"][accessor["bufferView"].as_u64().unwrap() as usize];
-    let [from, length] = ["byteOffset", "byteLength"].map(|key| view[key].as_u64().unwrap() as usize);
-    let numbers = binary[from..from + length].chunks(4).map(|x| f32::from_le_bytes(x.try_into().unwrap()));
-    let table = sandbox.text("baked/occlusion.csv");
-    let rows: Vec<f32> =
-        table.lines().skip(1).map(|row| row.split(',').nth(1).unwrap().parse().unwrap()).collect();
-    // The mesh has more where vertices were split for their tangents; the file's own come first.
-    let count = accessor["count"].as_u64().unwrap() as usize;
-    assert!(count <= rows.len() && rows.iter().any(|open| *open < 0.9));
-    // The table's numbers are printed so that they read back to the bit.
-    assert_eq!(numbers.collect::<Vec<_>>(), rows[..count]);
-    let draw = |scene: &str, to: &str| {
-        let small = ["--view", "front", "--size", "64x64"];
-        sandbox.run(&[&["render", scene, "--engine", "cpu", "-o", to][..], &small].concat()).done();
-        read_exr(&sandbox.path(to)).rgb(["R", "G", "B"])
-    };
-    let scene = sandbox.text("head/scene.toml").replace("head.glb", "../baked/vertices.glb");
-    assert!(scene.contains("../baked/vertices.glb"), "{scene}");
-    sandbox.write("head/other.toml", scene.as_bytes());
-    assert!(draw("head/scene.toml", "a.exr") == draw("head/other.toml", "b.exr"), "the pictures differ");
-    // Of a scene that bakes nothing at vertices there is nothing to add.
-    let ran = sandbox.run(&["bake", "scene.toml", "-o", "less", "--glb", "--effects", "diffuse"]);
-    assert!(ran.code == Some(0) && ran.err.contains("nothing is baked of vertices"), "{ran:?}");
-    assert!(!sandbox.path("less/vertices.glb").exists());
 }
 
 /// Fragments all around, on edges and corners of the cube too: unit normal, open share, 1 - |N.V|.
