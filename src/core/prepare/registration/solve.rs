@@ -27,7 +27,7 @@ const ROUGHNESS: f64 = 0.01;
 const DAMPING: f64 = 1e-3;
 const MOST_DAMPING: f64 = 1e3;
 /// What holds the focal length and the distance where images do not tell them apart: a share of the mean curvature.
-const HOLD: f64 = 1e-4;
+const HOLD: f64 = 1e-5;
 
 type Curvature = SMatrix<f64, COUNT, COUNT>;
 type Gradient = SVector<f64, COUNT>;
