@@ -10,7 +10,7 @@ pub const LONGEST: usize = 512;
 
 const SEEN: &str = "What the fitted constants make in texels of the UV atlas, u to the right and v down; grey where the mesh \
     covers none. Radiance is shown as sRGB, clipped to [0, 1]; what a blur is called by is its standard deviation on the \
-    skin. <code>skinfit bake --stages</code> writes the numbers.";
+    skin. <code>skinfit bake</code> can write their numbers.";
 
 /// The stages of a scene.
 #[derive(Clone, Debug)]

@@ -139,8 +139,8 @@ fn posed_key(mut key: Key, pose: &(dyn Fn(&[f32]) -> PosedMesh + Sync), morphs: 
             key = key.with(&rest.positions).with(&rest.normals);
         }
         // Those of all poses are the same.
-        if let Some(cutouts) = Cutouts::of(&posed).filter(|_| target == 0) {
-            key = cutouts.key(key);
+        if target == 0 {
+            key = Cutouts::of(&posed).into_iter().fold(key, |key, cutouts| cutouts.key(key));
         }
     }
     (key, vertices)

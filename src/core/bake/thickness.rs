@@ -4,7 +4,7 @@
 //! where it leaves: of a slab all tell its thickness, whatever the cone. What is kept is the mean of the *inverses*. A ray
 //! that leaves by a hole of the mesh and meets nothing then counts as one without end, and one that runs along a nostril or
 //! into the mouth no more than its share, where in a plain mean either would hide all thin parts around it. Light, too, comes
-//! by the short ways: exp(-d / l) is convex in d.
+//! by the short ways: exp(-d / l) is convex in d. Cards of hair and lashes do not count: their roots lie below the skin.
 
 use glam::{DVec3, Vec3A};
 
@@ -54,7 +54,8 @@ impl VertexThickness {
 /// that a target adds nothing where it changes nothing.
 #[must_use]
 pub fn bake_thickness(pose: &(dyn Fn(&[f32]) -> PosedMesh + Sync), morphs: usize) -> VertexThickness {
-    let vertices = VertexRays::inward(pose, morphs, RAYS, WIDEST);
+    let solid = |weights: &[f32]| pose(weights).without_open();
+    let vertices = VertexRays::inward(&solid, morphs, RAYS, WIDEST);
     let bar = progress::bar("thickness", (vertices.len() * (1 + morphs)) as u64);
     let inverse = |mesh: &PosedMesh, i: usize, rays: &Rays, found: &[Nearest]| {
         bar.inc(1);

@@ -74,7 +74,9 @@ pub(super) fn warn_of_other_than_normals(path: &Path, map: &Map<3>, warnings: &m
         others += u64::from(normal.z <= 0.0 || !(0.7..1.3).contains(&normal.length()));
     }
     let share = others as f64 / count.max(1) as f64;
-    let why = if share > MOST {
+    let why = if count == 0 {
+        "it is black".to_owned()
+    } else if share > MOST {
         format!("{:.0}% of its texels are far from unit vectors that point out of the surface", 100.0 * share)
     } else if mean.truncate().length() > mean.z {
         // Bumps lean to all sides. Bright colours are unit vectors, too, which lean to one.

@@ -91,6 +91,16 @@ pub struct RestSurface {
 }
 
 impl PosedMesh {
+    /// The same without what has holes or blends, whose triangles have no area then.
+    #[must_use]
+    pub fn without_open(mut self) -> Self {
+        if let Some(plain) = &self.plain {
+            let open = (0..).zip(&mut self.triangles).filter(|(triangle, _)| plain.is_open(*triangle));
+            open.for_each(|(_, corners)| *corners = [corners[0]; 3]);
+        }
+        self
+    }
+
     /// Its triangles, of which those that are not skin have no area: for what the skin's own texture coordinates are of.
     #[must_use]
     pub fn skin_triangles(&self) -> Cow<'_, [[u32; 3]]> {

@@ -134,14 +134,17 @@ fn caption(name: &str, image: &Image, params: &Params) -> String {
         ),
         "light_map" => "light map: linear radiance, before it is blurred".to_owned(),
         "sum" => "sum of the levels by their weights: linear radiance, looked up by pixels".to_owned(),
-        _ => {
-            let level = name.strip_prefix("level_").and_then(|k| k.parse::<usize>().ok()).unwrap_or(0);
-            let of = |k: usize| Param::from_name(&format!("diffusion_radius_{k}"));
-            // The variances of blurs of blurs add.
-            let variance: f64 = (1..=level).filter_map(of).map(|param| params.scalar(param).powi(2)).sum();
-            let deviation = number(variance.sqrt(), 3);
-            format!("level {level}: linear radiance, the light map blurred by {deviation} mm")
-        }
+        _ => match name.strip_prefix("level_").and_then(|k| k.parse::<usize>().ok()) {
+            Some(level) => {
+                let of = |k: usize| Param::from_name(&format!("diffusion_radius_{k}"));
+                // The variances of blurs of blurs add.
+                let variance: f64 =
+                    (1..=level).filter_map(of).map(|param| params.scalar(param).powi(2)).sum();
+                let deviation = number(variance.sqrt(), 3);
+                format!("level {level}: linear radiance, the light map blurred by {deviation} mm")
+            }
+            None => name.to_owned(),
+        },
     }
 }
 

@@ -106,7 +106,10 @@ fn import_as_told(folder: &Path, page: &str) {
 #[test]
 fn the_report_has_what_its_page_speaks_of() {
     let sandbox = super::sandbox::Sandbox::new();
-    sandbox.fit("run", &[]);
+    // With what only some scenes have.
+    sandbox.edit("[quality]", "[diffusion]\nlight_map_size = 64\n[quality]");
+    sandbox.edit("\"reflection\"]", "\"reflection\", \"diffusion\"]");
+    sandbox.fit("run", &["--free", "base_weight"]);
     let report = sandbox.text("run/report.html");
     let page = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/report.md")).unwrap();
     let named: Vec<&str> = page.split("\"**").skip(1).filter_map(|rest| rest.split("**\"").next()).collect();

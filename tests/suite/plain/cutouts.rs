@@ -17,6 +17,8 @@ use crate::scene_folder::encode;
 
 /// Rays a vertex.
 const RAYS: u32 = 256;
+/// As many as tell shares apart.
+const MANY: u32 = 16_384;
 
 /// What a texel has of alpha, by its column and row.
 type Alpha = fn(u32, u32) -> u8;
@@ -56,7 +58,11 @@ fn under_a_card(
 
 /// The shares of their hemispheres in which the skin's four vertices see the card.
 fn hidden(mesh: &PosedMesh) -> Vec<f32> {
-    let open = bake_occlusion(&|_| mesh.clone(), 0, RAYS).base;
+    hidden_from(mesh, RAYS)
+}
+
+fn hidden_from(mesh: &PosedMesh, rays: u32) -> Vec<f32> {
+    let open = bake_occlusion(&|_| mesh.clone(), 0, rays).base;
     open[..4].iter().map(|open| 1.0 - open).collect()
 }
 
@@ -68,11 +74,17 @@ fn hidden_by(material: &Value, alpha: impl Fn(u32, u32) -> u8) -> Vec<f32> {
 /// Whether of the rays that meet the whole card about so many are stopped, at each vertex.
 fn about(share: f32, got: &[f32], whole: &[f32]) -> bool {
     got.iter().zip(whole).all(|(got, whole)| {
-        // Four standard deviations of a coin that is tossed for each ray.
-        let tossed = RAYS as f32 * whole;
-        let deviation = (tossed * share * (1.0 - share)).sqrt() / RAYS as f32;
-        (got - share * whole).abs() < 4.0 * deviation
+        // Four standard deviations of a coin that is tossed for each of many rays: a few hundredths of the whole, of which
+        // the shares that are told apart here are tenths.
+        let tossed = MANY as f32 * whole;
+        let deviation = (tossed * share * (1.0 - share)).sqrt() / MANY as f32;
+        4.0 * deviation < 0.05 * whole && (got - share * whole).abs() < 4.0 * deviation
     })
+}
+
+/// What many rays find.
+fn shares(mesh: &PosedMesh) -> Vec<f32> {
+    hidden_from(mesh, MANY)
 }
 
 #[test]
@@ -109,7 +121,9 @@ fn of_a_picture_and_its_negative_each_ray_meets_one() {
                 assert_eq!(one[i] + other[i], whole[i], "{mode}, {name}: {one:?} {other:?}");
             }
         }
-        assert!(about(0.5, &hidden_by(&card, checks), &whole), "{mode}");
+        let [got, whole] =
+            [checks as Alpha, |_, _| 255].map(|alpha| shares(&under_a_card(&card, alpha, |_| {})));
+        assert!(about(0.5, &got, &whole), "{mode}: {got:?} of {whole:?}");
         // The card's left half hides more from the vertices below it: the first and the last of the quad.
         let left = hidden_by(&card, halves);
         assert!(left[0] > 2.0 * left[1] && left[3] > 2.0 * left[2], "{mode}: {left:?}");
@@ -152,9 +166,9 @@ fn a_mask_cuts_at_its_cutoff_what_picture_factor_and_vertices_have_of_alpha() {
 
 #[test]
 fn what_blends_stops_its_share_of_rays_and_two_layers_what_both_do() {
-    let whole = hidden_by(&card("OPAQUE"), |_, _| 255);
+    let whole = shares(&under_a_card(&card("OPAQUE"), |_, _| 255, |_| {}));
     for alpha in [51, 128, 204] {
-        let got = hidden_by(&card("BLEND"), |_, _| alpha);
+        let got = shares(&under_a_card(&card("BLEND"), |_, _| alpha, |_| {}));
         assert!(about(f32::from(alpha) / 255.0, &got, &whole), "{alpha}: {got:?} of {whole:?}");
     }
     // So near above the first that rays go by both or neither; 128 of 255 twice lets a quarter through.
@@ -162,27 +176,42 @@ fn what_blends_stops_its_share_of_rays_and_two_layers_what_both_do() {
         mesh["nodes"].as_array_mut().unwrap().push(json!({"mesh": 1, "translation": [0, 0, 0.501]}));
         mesh["scenes"][0]["nodes"] = json!([0, 1, 2]);
     };
-    let got = hidden(&under_a_card(&card("BLEND"), |_, _| 128, second));
+    let got = shares(&under_a_card(&card("BLEND"), |_, _| 128, second));
     assert!(about(0.75, &got, &whole), "{got:?} of {whole:?}");
 }
 
 /// The picture of a lit scene, whose card is half as wide as the skin and shades its right.
-fn lit(material: &Value, alpha: impl Fn(u32, u32) -> u8) -> Baked {
+fn lit(material: &Value, alpha: impl Fn(u32, u32) -> u8, edit: impl FnOnce(&mut Value)) -> Baked {
     let lamp = "[[light]]\nname = \"cut_aside\"\ntype = \"directional\"\ndirection = [1, 0, -0.7]\nirradiance = [3.0, 3.0, 3.0]\n";
+    let side = |key: &str| (format!("{key} = 16"), format!("{key} = {}", 16 * FINER));
+    let [(wide, wider), (high, higher)] = ["width", "height"].map(side);
     let scene = SCENE
+        .replace(&wide, &wider)
+        .replace(&high, &higher)
         .replace("\"diffuse\"", "\"lights\", \"shadows\"")
         .replace("[environment]\nfile = \"env.exr\"\n", lamp);
-    let folder = edited(material, &scene, |_, _| {});
+    let folder = edited(material, &scene, |mesh, _| edit(mesh));
     folder.write("picture.png", &picture(alpha));
     let options = PrepareOptions { cache: Some(cache()), ..PrepareOptions::default() };
     Baked::new(&folder.path("scene.toml"), &options).unwrap()
 }
 
-/// How bright the skin is in column 14 of rows 5 to 10, which the card's right half shades, beside column 1, its mirror image,
-/// which nothing does.
+/// Pixels a side of each of the picture's 16 squares a side.
+const FINER: usize = 4;
+
+/// How bright the skin is in column 14 of rows 5 to 10 of squares, which the card's right half shades, beside column 1, its
+/// mirror image, which nothing does.
 fn beside_the_open(image: &Image) -> f32 {
-    let sum = |column: usize| (5..11).map(|row| image.rgb[16 * row + column][0]).sum::<f32>();
+    let column = |at: usize| FINER * at..FINER * (at + 1);
+    let row = |y: usize, at: usize| column(at).map(|x| image.rgb[image.width * y + x][0]).sum::<f32>();
+    let sum = |at: usize| (5 * FINER..11 * FINER).map(|y| row(y, at)).sum::<f32>();
     sum(14) / sum(1)
+}
+
+/// By rays, of which each pixel has 64, and by the renderer's shadow maps, where there is an adapter.
+fn traced_and_drawn(baked: &Baked) -> [Option<f32>; 2] {
+    let drawn = gpu().map(|gpu| beside_the_open(&on_gpu(gpu, baked, EXACT)));
+    [Some(beside_the_open(&on_cpu(baked, 8))), drawn]
 }
 
 #[test]
@@ -196,24 +225,61 @@ fn a_lamp_shines_through_holes_by_rays_and_by_shadow_maps() {
         ("BLEND", |_, _| 128, 0.5),
     ];
     for (mode, alpha, want) in cases {
-        let baked = lit(&card(mode), alpha);
-        // Rays: 64 in each of six pixels, four standard deviations of as many coins. Of whole and clear places all are alike;
-        // what is beside 1 there is the roundings of shading.
-        let tolerance = if want == 0.5 { 4.0 * 0.5 / (6.0_f32 * 64.0).sqrt() } else { 1e-3 };
-        let traced = beside_the_open(&on_cpu(&baked, 8));
-        assert!((traced - want).abs() < tolerance, "{mode}, rays: {traced} is not {want}");
-        let Some(gpu) = gpu() else { continue };
-        // Maps: four fragments in each of six pixels, of which each asks at least two texels that are coins of their own.
-        let tolerance = if want == 0.5 { 4.0 * 0.5 / (6.0_f32 * 4.0 * 2.0).sqrt() } else { 1e-3 };
-        let drawn = beside_the_open(&on_gpu(gpu, &baked, EXACT));
-        assert!((drawn - want).abs() < tolerance, "{mode}, shadow map: {drawn} is not {want}");
+        // Four standard deviations of as many coins as there are rays, and as many as four fragments a pixel ask of texels,
+        // two of their own each. Of whole and clear places all are alike: what is beside 1 there is the roundings of shading.
+        let pixels = (6 * FINER * FINER) as f32;
+        let coins = [64.0 * pixels, 4.0 * 2.0 * pixels];
+        let found = traced_and_drawn(&lit(&card(mode), alpha, |_| {}));
+        for ((found, coins), how) in found.into_iter().zip(coins).zip(["rays", "shadow map"]) {
+            let tolerance = if want == 0.5 { 4.0 * 0.5 / coins.sqrt() } else { 1e-3 };
+            let Some(found) = found else { continue };
+            assert!((found - want).abs() < tolerance, "{mode}, {how}: {found} is not {want}");
+        }
+    }
+}
+
+#[test]
+fn shadow_maps_and_rays_look_alpha_up_alike() {
+    type Edit = fn(&mut Value);
+    let factor: Edit = |card| card["pbrMetallicRoughness"]["baseColorFactor"] = json!([1, 1, 1, 0.9]);
+    // The alpha of these colours is 0.
+    let colored: Edit = |mesh| mesh["meshes"][1]["primitives"][0]["attributes"]["COLOR_0"] = json!(3);
+    // 128 of 255, which is just above a half, is all of the picture: all of the place is shaded, or nothing.
+    let cases: [(&str, Edit, Edit, f32); 5] = [
+        ("as it is", |_| {}, |_| {}, 0.0),
+        ("a factor", factor, |_| {}, 1.0),
+        ("a cutoff", |card| card["alphaCutoff"] = json!(0.6), |_| {}, 1.0),
+        ("a lower cutoff", |card| card["alphaCutoff"] = json!(0.4), |_| {}, 0.0),
+        ("colours of vertices", |_| {}, colored, 1.0),
+    ];
+    for (name, edit_card, edit_mesh, want) in cases {
+        let mut card = card("MASK");
+        edit_card(&mut card);
+        for found in traced_and_drawn(&lit(&card, |_, _| 128, edit_mesh)).into_iter().flatten() {
+            // Roundings of shading.
+            assert!((found - want).abs() < 1e-3, "{name}: {found} is not {want}");
+        }
+    }
+    // Moved by half the picture's width; clamped at its border, its last column, which is clear.
+    let mut shifted = card("MASK");
+    shifted["pbrMetallicRoughness"]["baseColorTexture"]["extensions"] =
+        json!({"KHR_texture_transform": {"offset": [0.5, 0]}});
+    let clamp = |mesh: &mut Value| {
+        mesh["samplers"] = json!([{"magFilter": 9728, "wrapS": 33071}]);
+        mesh["textures"][0]["sampler"] = json!(0);
+    };
+    let [repeated, clamped] =
+        [lit(&shifted, halves, |_| {}), lit(&shifted, halves, clamp)].map(|baked| traced_and_drawn(&baked));
+    for (repeated, clamped) in repeated.into_iter().zip(clamped) {
+        let (Some(repeated), Some(clamped)) = (repeated, clamped) else { continue };
+        assert!(repeated < 1e-3 && (clamped - 1.0).abs() < 1e-3, "{repeated} {clamped}");
     }
 }
 
 #[test]
 fn the_shadow_of_what_has_holes_goes_with_it() {
     let Some(gpu) = gpu() else { return };
-    let baked = lit(&card("MASK"), halves);
+    let baked = lit(&card("MASK"), halves, |_| {});
     let camera = baked.scene.views[0].camera;
     let options = RenderOptions { animated: true, ..EXACT };
     let mut renderer = Renderer::new(gpu, Content::of(&baked), options).unwrap();

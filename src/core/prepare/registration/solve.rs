@@ -26,7 +26,8 @@ const ROUGHNESS: f64 = 0.01;
 /// The damping that is begun with, as a share of each unknown's curvature, and beyond which nothing is tried.
 const DAMPING: f64 = 1e-3;
 const MOST_DAMPING: f64 = 1e3;
-/// What holds the focal length and the distance where images do not tell them apart: a share of the mean curvature.
+/// What holds the focal length and the distance where images do not tell them apart: a share of the mean curvature. With
+/// ten times as much a focal length that is a percent off stays so; with a tenth nothing is nearer.
 const HOLD: f64 = 1e-5;
 
 type Curvature = SMatrix<f64, COUNT, COUNT>;

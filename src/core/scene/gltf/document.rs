@@ -72,7 +72,7 @@ impl Document {
                 ));
             };
             let body: Cow<'_, [u8]> = percent_decode_str(body).into();
-            let encoding = head.rsplit(';').next().map_or("", str::trim);
+            let encoding = head.rsplit_once(';').map_or("", |(_, encoding)| encoding.trim());
             if !encoding.eq_ignore_ascii_case("base64") {
                 return Ok(body.into_owned());
             }

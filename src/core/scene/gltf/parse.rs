@@ -32,6 +32,7 @@ pub(super) fn value(text: &[u8]) -> Result<Value, Error> {
 fn whole(value: &mut Value) -> bool {
     const EXACT: f64 = (1_u64 << f64::MANTISSA_DIGITS) as f64;
     match value {
+        // All are looked at: counting does not stop at the first, as `any` would.
         Value::Array(items) => items.iter_mut().map(whole).filter(|changed| *changed).count() > 0,
         Value::Object(fields) => fields.values_mut().map(whole).filter(|changed| *changed).count() > 0,
         Value::Number(number) => {

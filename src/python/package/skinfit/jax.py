@@ -73,8 +73,8 @@ def image(objective: Objective, view: str | None = None) -> Callable[[jax.Array]
     return function
 
 
-def _once_more(*_: Any, **__: Any) -> Any:
-    """The derivative of a derivative, which there is none of."""
+def _no_second(*_: Any, **__: Any) -> Any:
+    """Refuses to differentiate what is a derivative already, or is computed by one pass with it."""
     raise TypeError("skinfit has first derivatives alone. For a Hessian take Objective.normal_equations.")
 
 
@@ -87,8 +87,8 @@ def _called(function: Callable[..., Any], shape: tuple[int, ...], *arrays: jax.A
 
     def call(*given: Any) -> Any:
         read = (np.asarray(array).view(np.float64)[..., 0] if wide else np.asarray(array, np.float64) for array in given)
-        made = np.asarray(function(*read), kind, order="C")
-        return made[..., np.newaxis].view(np.uint32) if wide else made
+        answer = np.asarray(function(*read), kind, order="C")
+        return answer[..., np.newaxis].view(np.uint32) if wide else answer
 
     # Bits have no tangents: without a rule of its own this would be a constant.
     @jax.custom_jvp
@@ -99,13 +99,13 @@ def _called(function: Callable[..., Any], shape: tuple[int, ...], *arrays: jax.A
             )
             return narrow
         bits = (jax.lax.bitcast_convert_type(array.astype(kind), jnp.uint32) for array in arrays)
-        made = jax.pure_callback(call, jax.ShapeDtypeStruct((*shape, 2), jnp.uint32), *bits, vmap_method="sequential")
-        exact: jax.Array = jax.lax.bitcast_convert_type(made, kind)
+        answer = jax.pure_callback(call, jax.ShapeDtypeStruct((*shape, 2), jnp.uint32), *bits, vmap_method="sequential")
+        exact: jax.Array = jax.lax.bitcast_convert_type(answer, kind)
         return exact
 
-    result.defjvp(_once_more)
-    made: jax.Array = result(*arrays)
-    return made
+    result.defjvp(_no_second)
+    found: jax.Array = result(*arrays)
+    return found
 
 
 def _linear(name: str, product: Callable[..., Any], made: Callable[..., tuple[int, ...]]) -> Primitive:
@@ -127,7 +127,7 @@ def _linear(name: str, product: Callable[..., Any], made: Callable[..., tuple[in
     primitive.def_impl(called)
     primitive.def_abstract_eval(lambda _, along, **of: jax.core.ShapedArray(made(**of), along.dtype))
     mlir.register_lowering(primitive, mlir.lower_fun(called, multiple_results=False))
-    ad.defjvp(primitive, _once_more, lambda tangent, x, _, **of: primitive.bind(x, tangent, **of))
+    ad.defjvp(primitive, _no_second, lambda tangent, x, _, **of: primitive.bind(x, tangent, **of))
     batching.primitive_batchers[primitive] = each
     return primitive
 

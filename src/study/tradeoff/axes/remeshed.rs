@@ -122,7 +122,7 @@ fn seen_of_sky(
     mesh: &PosedMesh,
     bakes: SurfaceBakes<'_>,
 ) -> Result<Vec<VertexField>, SampleError> {
-    let rays = RayMesh::new(&mesh.positions, &mesh.triangles);
+    let rays = RayMesh::of(mesh);
     let surface = PosedSurface::new(scene, mesh, &rays, &scene.mesh.morphs, bakes)?;
     let of_sky = |field: &Field| [SKY_RATIO, BENT_NORMAL].contains(&field.name());
     let fields = scene.needs().fields.iter().filter(of_sky);
