@@ -94,9 +94,8 @@ fn cameras_of_the_built_in_scene_are_found_again() {
     for ([truth, before, after], moved) in cameras.iter().zip(&baked.cameras) {
         let (start, end) = (apart(&baked, truth, before), apart(&baked, truth, after));
         println!("{}: {start:?} -> {end:?}, settled: {}", moved.view, moved.settled);
-        let of = if moved.view == "profile" { "profile" } else { "others" };
-        crate::figures::measured(&format!("registration {of} start"), start[0]);
-        crate::figures::measured(&format!("registration {of} end"), end[0]);
+        crate::figures::measured("registration start", start[0]);
+        crate::figures::measured("registration end", end[0]);
         // A tenth of a pixel. A profile is turned about its vertical axis without a change of its silhouette, which shows
         // where it is nearest.
         let most = if moved.view == "profile" { 1.0 } else { 0.3 };
