@@ -43,7 +43,7 @@ fn a_fit_finds_a_displaced_camera_and_writes_it_down() {
     // A tenth of a pixel of five.
     assert!(off(found) < 0.02 * off(moved), "{} {}", off(found), off(moved));
     // A camera further away with a longer lens shows nearly the same: with half a percent of both the head stays within an
-    // eighth of a pixel, and of four samples a pixel coverage tells no less.
+    // eighth of a pixel, which the coverage of four samples a pixel hardly tells.
     assert!((found_fov / fov - 1.0).abs() < 5e-3, "{found_fov} {fov}");
     // It is done: another fit of the run's scene moves nothing.
     assert!(!fitted.contains("cameras = true"), "{fitted}");

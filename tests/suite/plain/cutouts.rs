@@ -4,6 +4,7 @@ use serde_json::{Value, json};
 use skinfit::bake::harmonics::Order;
 use skinfit::bake::interreflection::Albedo;
 use skinfit::bake::occlusion::bake_occlusion;
+use skinfit::bake::thickness::bake_thickness;
 use skinfit::bake::transfer::bake_transfer;
 use skinfit::gpu::upload::Content;
 use skinfit::gpu::{RenderOptions, Renderer};
@@ -178,6 +179,22 @@ fn what_blends_stops_its_share_of_rays_and_two_layers_what_both_do() {
     };
     let got = shares(&under_a_card(&card("BLEND"), |_, _| 128, second));
     assert!(about(0.75, &got, &whole), "{got:?} of {whole:?}");
+}
+
+#[test]
+fn skin_is_as_thick_as_if_cards_below_it_were_not_there() {
+    let below = |mode: &str, alpha: u8| {
+        let lower = |mesh: &mut Value| mesh["nodes"][1]["translation"] = json!([0, 0, -0.5]);
+        let mesh = under_a_card(&card(mode), |_, _| alpha, lower);
+        // The skin's own vertices come first.
+        bake_thickness(&|_| mesh.clone(), 0).base[..4].to_vec()
+    };
+    // Rays inward end at opaque parts.
+    let solid = below("OPAQUE", 255);
+    assert!(solid.iter().all(|inverse| *inverse > 0.0), "{solid:?}");
+    for mode in ["MASK", "BLEND"] {
+        assert_eq!(below(mode, 255), [0.0; 4], "{mode}");
+    }
 }
 
 /// The picture of a lit scene, whose card is half as wide as the skin and shades its right.

@@ -1,8 +1,9 @@
 //! What a drawn image and a target differ by: in coverage, and in colour where both are covered wholly.
 //!
 //! The constants are not fitted yet, so that colours are compared but for a weight of each term's and a constant a channel,
-//! which are the best for that image: of most terms the constants are such weights. What the model's light is off by still pulls at a camera: over whole regions it is what a turn
-//! would change. So at last the mean around each pixel is left out, and what is finer tells: texture, and creases.
+//! which are the best for that image: of most terms the constants are such weights. What the model's light is off by still
+//! pulls at a camera: over whole regions it is what a turn would change. So at last the mean around each pixel is left out,
+//! and what is finer tells: texture, and creases.
 //! Each kind of difference weighs by how large it is where nothing moves it any more.
 
 use nalgebra::{DMatrix, DVector};

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use super::Arguments;
-use super::evidence::{diffused, evidence};
+use super::evidence::{Evidence, evidence};
 use super::scenes::Scenes;
 use super::solve::Solving;
 use super::words::{Times, advice, advice_on_maps, tell_run};
@@ -41,8 +41,7 @@ pub(super) fn conclude(
     outcome: &Outcome,
 ) -> Result<Exit, Refusal> {
     let clock = Instant::now();
-    let views = evidence(scenes, &outcome.end)?;
-    let diffused = diffused(scenes, &outcome.end)?;
+    let Evidence { views, diffused } = evidence(scenes, &outcome.end)?;
     let mut seconds = scenes.seconds();
     // Of every process that had a part in it, where the fit was resumed.
     seconds.fit = outcome.seconds;

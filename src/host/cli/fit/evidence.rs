@@ -18,12 +18,19 @@ use crate::report::diffusion::DiffusedScene;
 use crate::scene::view::View;
 use crate::shader::term::library;
 
-/// For each view the target, the fit and its terms: those that were fitted, scene by scene, then those that were held
-/// out.
-pub(super) fn evidence(scenes: &Scenes, end: &Point) -> Result<Vec<ViewEvidence>, Refusal> {
+/// What a fit's report shows of its end.
+pub(super) struct Evidence {
+    /// The views that were fitted, scene by scene, then those that were held out.
+    pub(super) views: Vec<ViewEvidence>,
+    /// The scenes that have diffusion.
+    pub(super) diffused: Vec<DiffusedScene>,
+}
+
+/// For each view the target, the fit and its terms; of each scene what diffusion has made, where it has any.
+pub(super) fn evidence(scenes: &Scenes, end: &Point) -> Result<Evidence, Refusal> {
     let count = |part: &JointScene| part.baked.scene.views.len() + part.held.views.len();
     let bar = progress::bar("pictures", scenes.parts.iter().map(count).sum::<usize>() as u64);
-    let (mut fitted, mut others) = (Vec::new(), Vec::new());
+    let (mut fitted, mut others, mut diffused) = (Vec::new(), Vec::new(), Vec::new());
     for part in &scenes.parts {
         let own = scenes.point_of(part, end);
         let shader = Shader::new(part.baked.setup(), &part.baked.illumination, &own.params)?;
@@ -32,32 +39,35 @@ pub(super) fn evidence(scenes: &Scenes, end: &Point) -> Result<Vec<ViewEvidence>
             let name = scenes.view_name(part, &view.name);
             ViewEvidence { name, held_out, ..shown(part, (&shader, &own.params), (view, observed, gain)) }
         };
-        if let Some(engine) = scenes.engine(part) {
-            let observed = surfaced_views(engine)?;
-            let views = part.baked.scene.views.iter().zip(observed.iter()).zip(&own.gains);
-            fitted.extend(views.map(|((view, observed), &gain)| shown((view, observed, gain, false))));
-        }
+        let observed = scenes.engine(part).map(surfaced_views).transpose()?;
+        let observed = observed.as_deref().unwrap_or_default();
+        let views = part.baked.scene.views.iter().zip(observed).zip(&own.gains);
+        fitted.extend(views.map(|((view, observed), &gain)| shown((view, observed, gain, false))));
         let held = part.held.views.iter().zip(&part.held.observed).zip(&part.held.gains);
         others.extend(held.map(|((view, observed), &gain)| shown((view, observed, gain, true))));
+        let name = if scenes.several() { part.name.as_str() } else { "" };
+        diffused.extend(diffused_in(part, name, &own.params, observed)?);
     }
     bar.finish_and_clear();
     fitted.extend(others);
-    Ok(fitted)
+    Ok(Evidence { views: fitted, diffused })
 }
 
-/// What diffusion has made in texels of each scene that has it, at the end of the fit. The texels are those of the
-/// samples, whose fields are found already: one more pass over them is all that it takes.
-pub(super) fn diffused(scenes: &Scenes, end: &Point) -> Result<Vec<DiffusedScene>, Refusal> {
-    let mut diffused = Vec::new();
-    for part in scenes.parts.iter().filter(|part| library::scatters(part.baked.scene.effects)) {
-        let fitted = scenes.engine(part).map(surfaced_views).transpose()?;
-        let mut views = fitted.iter().flat_map(|views| views.iter()).chain(&part.held.observed);
-        let Some(atlas) = views.find_map(|view| view.samples.atlas.as_deref()) else { continue };
-        let params = scenes.point_of(part, end).params;
-        let name = if scenes.several() { part.name.clone() } else { String::new() };
-        diffused.push(Stages::new(&part.baked, atlas, &params, &[])?.shown(name, &params));
+/// What diffusion makes at `params` in texels of a scene's views, whose fields are found already: one more pass over them is
+/// all that it takes. `None` where the scene has no diffusion.
+fn diffused_in(
+    part: &JointScene,
+    name: &str,
+    params: &Params,
+    observed: &[ObservedView],
+) -> Result<Option<DiffusedScene>, Refusal> {
+    if !library::scatters(part.baked.scene.effects) {
+        return Ok(None);
     }
-    Ok(diffused)
+    // All views of a scene show the same texels.
+    let atlas = observed.iter().chain(&part.held.observed).find_map(|view| view.samples.atlas.as_deref());
+    let stages = atlas.map(|atlas| Stages::new(&part.baked, atlas, params, &[])).transpose()?;
+    Ok(stages.map(|stages| stages.shown(name.to_owned(), params)))
 }
 
 /// The images of a view of a scene, at the scene's constants.
