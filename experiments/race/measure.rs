@@ -36,7 +36,6 @@ pub(crate) fn gauss_newton_step(engine: &dyn Objective, point: &Point) -> Point 
     let k = at.len();
     let hessian: Vec<f64> = (0..k * k).map(|ij| sums.jtj[ij] * slope[ij / k] * slope[ij % k]).collect();
     let gradient: Vec<f64> = (0..k).map(|i| sums.jtr[i] * slope[i]).collect();
-    let (lower, upper) = coordinates.room(at);
-    let step = bounded::minimise(&hessian, &gradient, &lower, &upper);
+    let step = bounded::minimise(&hessian, &gradient, &coordinates.room(at));
     coordinates.point(&coordinates.moved(at, &step))
 }

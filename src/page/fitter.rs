@@ -169,6 +169,7 @@ impl UnderWay {
             state: Some(state),
             interrupt: Some(Arc::clone(&over)),
             bounds: self.scenes.bounds(),
+            effects: Some(self.scenes.effects()),
             widths: self.scenes.widths(),
             ..FitOptions::default()
         };

@@ -53,6 +53,9 @@ pub struct Summary {
     pub correlations: Correlations,
     /// Combinations that the images do not determine, each a unit vector (unknown: component).
     pub undetermined: Vec<Ordered<f64>>,
+    /// Unknowns that are shares of a whole and add up to all that there is, those of each whole together.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub full_shares: Vec<Vec<String>>,
     /// The loss after each iteration.
     pub history: Vec<Iteration>,
     /// What the fit gets wrong as a whole, and where.
@@ -191,6 +194,7 @@ impl Summary {
                     .map(|(i, row)| row.iter().enumerate().map(|(j, &r)| known(outcome, i, j, r)).collect())
                     .collect(),
             },
+            full_shares: outcome.full_shares.clone(),
             undetermined: outcome
                 .undetermined
                 .iter()

@@ -23,6 +23,7 @@ pub(super) fn verdict(summary: &Summary) -> Vec<String> {
         _ => sentences
             .push(format!("{} ended on bounds: they may want values that are not allowed.", list(&at_bound))),
     }
+    sentences.extend(filled(summary));
     match (unknown.is_empty(), summary.unknowns.is_empty()) {
         (_, true) => {
             sentences.push("Nothing was free: the images were compared with the start values.".to_owned());
@@ -38,6 +39,14 @@ pub(super) fn verdict(summary: &Summary) -> Vec<String> {
     sentences.extend(errors::sentences(summary));
     sentences.retain(|s| !s.is_empty());
     sentences
+}
+
+/// Shares that add up to the whole, a sentence for each channel of them.
+fn filled(summary: &Summary) -> impl Iterator<Item = String> {
+    let told = |shares: &Vec<String>| {
+        format!("{} leave nothing beside them: they may want more than the whole.", list(shares))
+    };
+    summary.full_shares.iter().map(told)
 }
 
 fn how_it_ended(summary: &Summary) -> String {

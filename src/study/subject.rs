@@ -158,7 +158,11 @@ impl Subject {
     /// # Errors
     /// When the fit cannot be done; one that does not converge says so in its outcome.
     pub fn fit_from(&self, start: &Point, options: &FitOptions) -> Result<Outcome, StudyError> {
-        let options = FitOptions { bounds: self.scenes.bounds(), ..options.clone() };
+        let options = FitOptions {
+            bounds: self.scenes.bounds(),
+            effects: Some(self.scenes.effects()),
+            ..options.clone()
+        };
         fit::fit(&self.scenes.joint, start, &options, &mut |_| {})
             .map_err(|error| StudyError::Fit { scene: self.scenes.files(), error })
     }

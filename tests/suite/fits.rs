@@ -7,6 +7,7 @@ mod correlated;
 mod damaged;
 mod image;
 mod resumed;
+mod shares;
 mod uncertain;
 
 use image::{Image, nine, point, tied, truth};

@@ -166,6 +166,7 @@ fn outcome() -> Outcome {
         correlations,
         errors: ErrorBasis::Blocks(Blocks { alike: 12, side: 40, count: 80, next: 0.9 }),
         profile: Some(profile()),
+        full_shares: vec![],
         undetermined: vec![
             Direction { components: vec![("reflection".to_owned(), 1.0)] },
             Direction { components: vec![("gain.1".to_owned(), 0.81), ("base_weight.r".to_owned(), -0.58)] },

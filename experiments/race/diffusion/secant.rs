@@ -52,8 +52,8 @@ impl Secant {
         }
         let curved = &hessian + &self.beyond;
         let hessian_of_step = if curved.clone().cholesky().is_some() { &curved } else { &hessian };
-        let (lower, upper) = self.coordinates.room(&self.at);
-        let step = bounded::minimise(hessian_of_step.as_slice(), gradient.as_slice(), &lower, &upper);
+        let room = self.coordinates.room(&self.at);
+        let step = bounded::minimise(hessian_of_step.as_slice(), gradient.as_slice(), &room);
         self.at = self.coordinates.moved(&self.at, &step);
         self.last = Some(Last { hessian, gradient, step: DVector::from_vec(step) });
         self.coordinates.point(&self.at)

@@ -1,9 +1,12 @@
 //! The coordinates that solvers step in: an unknown's value, or its logarithm where the parameter
 //! table says that its ratio is what matters.
 
+use super::room::{Room, Sum};
 use crate::engine::{Point, Unknown};
 use crate::model::bounds::Bounds;
-use crate::model::params::Scale;
+use crate::model::effects::Effects;
+use crate::model::params::{Param, Scale};
+use crate::model::shares;
 
 /// The map between points and vectors of solver coordinates.
 #[derive(Clone, Debug)]
@@ -15,19 +18,30 @@ pub struct Coordinates {
     bounds: Vec<(f64, f64)>,
     lower: Vec<f64>,
     upper: Vec<f64>,
+    /// Unknowns that are shares of one whole, and what they may add up to.
+    shares: Vec<(Vec<usize>, f64)>,
+}
+
+/// What bounds unknowns beside the table of parameters.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Limits<'a> {
+    /// What scenes set ([`Unknown::bounds_within`]).
+    pub bounds: &'a [Bounds],
+    /// The effects whose shares of a whole count; all where it is not said.
+    pub effects: Option<Effects>,
 }
 
 impl Coordinates {
     /// The coordinates of `unknowns`, within the table's bounds; everything else stays as it is at `origin`.
     #[must_use]
     pub fn new(unknowns: &[Unknown], origin: &Point) -> Self {
-        Self::within(unknowns, origin, &[])
+        Self::within(unknowns, origin, Limits::default())
     }
 
-    /// The same within what scenes set ([`Unknown::bounds_within`]).
+    /// The same within what a fit sets.
     #[must_use]
-    pub fn within(unknowns: &[Unknown], origin: &Point, scenes: &[Bounds]) -> Self {
-        let bounds: Vec<(f64, f64)> = unknowns.iter().map(|u| u.bounds_within(scenes)).collect();
+    pub fn within(unknowns: &[Unknown], origin: &Point, limits: Limits<'_>) -> Self {
+        let bounds: Vec<(f64, f64)> = unknowns.iter().map(|u| u.bounds_within(limits.bounds)).collect();
         let bounded = || unknowns.iter().zip(&bounds);
         Self {
             unknowns: unknowns.to_vec(),
@@ -35,6 +49,7 @@ impl Coordinates {
             at_origin: unknowns.iter().map(|u| inward(u, u.get(origin))).collect(),
             lower: bounded().map(|(u, (lower, _))| inward(u, *lower)).collect(),
             upper: bounded().map(|(u, (_, upper))| inward(u, *upper)).collect(),
+            shares: shares_of(unknowns, origin, limits.effects),
             bounds,
         }
     }
@@ -86,9 +101,50 @@ impl Coordinates {
         point
     }
 
+    /// The shares of one whole that add up to all that they may at these coordinates: each whole's unknowns.
+    pub fn full(&self, at: &[f64]) -> impl Iterator<Item = &[usize]> {
+        let full = |(of, most): &&(Vec<usize>, f64)| total(of, at) >= most - FULL;
+        self.shares.iter().filter(full).map(|(of, _)| of.as_slice())
+    }
+
+    /// Shares that add up to more than they may, lowered alike; the others as they are.
+    pub(super) fn share_out(&self, at: &mut [f64]) {
+        for (of, most) in &self.shares {
+            let total = total(of, at);
+            if total > *most {
+                of.iter().for_each(|&i| at[i] = (at[i] * most / total).max(self.lower[i]));
+            }
+        }
+    }
+
+    /// The derivative of a loss by coordinates before [`share_out`](Self::share_out), from that by those after it.
+    pub(super) fn share_out_pulled_back(&self, at: &[f64], gradient: &mut [f64]) {
+        let (mut after, mut befores) = (at.to_vec(), Vec::new());
+        for (of, most) in &self.shares {
+            let before: Vec<f64> = of.iter().map(|&i| after[i]).collect();
+            let total = total(of, &after);
+            if total > *most {
+                of.iter().for_each(|&i| after[i] *= most / total);
+            }
+            befores.push((before, total));
+        }
+        for ((of, most), (before, total)) in self.shares.iter().zip(befores).rev() {
+            if total > *most {
+                let along: f64 = of.iter().zip(&before).map(|(&i, x)| gradient[i] * x).sum();
+                of.iter().for_each(|&i| gradient[i] = (gradient[i] - along / total) * most / total);
+            }
+        }
+    }
+
     /// `at + step`, within the bounds, and on a bound to the bit where the step reaches it.
     #[must_use]
     pub fn moved(&self, at: &[f64], step: &[f64]) -> Vec<f64> {
+        let mut step = step.to_vec();
+        if !self.shares.is_empty() {
+            let room = self.room(at);
+            step.iter_mut().enumerate().for_each(|(i, d)| *d = d.clamp(room.down[i], room.up[i]));
+            room.cut(&mut step);
+        }
         (0..at.len())
             .map(|i| match step[i] {
                 d if d <= self.lower[i] - at[i] => self.lower[i],
@@ -98,11 +154,13 @@ impl Coordinates {
             .collect()
     }
 
-    /// How far a step from `at` may go down and up.
+    /// How far a step from `at` may go.
     #[must_use]
-    pub fn room(&self, at: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    pub fn room(&self, at: &[f64]) -> Room {
         let to = |bounds: &[f64]| bounds.iter().zip(at).map(|(b, u)| b - u).collect();
-        (to(&self.lower), to(&self.upper))
+        let sum =
+            |(of, most): &(Vec<usize>, f64)| Sum { of: of.clone(), room: (most - total(of, at)).max(0.0) };
+        Room { down: to(&self.lower), up: to(&self.upper), sums: self.shares.iter().map(sum).collect() }
     }
 
     /// The derivative of unknown `i`'s value with respect to its coordinate.
@@ -132,6 +190,40 @@ pub fn is_log(unknown: &Unknown) -> bool {
 /// Whether it is an angle.
 pub(super) fn is_angle(unknown: &Unknown) -> bool {
     unknown.column().is_some_and(|column| column.param.info().unit == "degrees")
+}
+
+/// Sums this near to what they may be are full: what solvers leave by rounding.
+const FULL: f64 = 1e-9;
+
+fn total(of: &[usize], at: &[f64]) -> f64 {
+    of.iter().map(|&i| at[i]).sum()
+}
+
+/// The unknowns of each whole's channels, and what those that are held leave them: no less than they have at the start.
+fn shares_of(unknowns: &[Unknown], origin: &Point, effects: Option<Effects>) -> Vec<(Vec<usize>, f64)> {
+    let mut found: Vec<(Vec<usize>, f64)> = Vec::new();
+    for (_, shares) in shares::wholes(effects) {
+        for channel in 0..3 {
+            let moves = |param: Param, unknown: &Unknown| {
+                let column = unknown.column();
+                column.is_some_and(|column| column.param == param && column.channels.includes(channel))
+            };
+            let of = |param: Param| (0..unknowns.len()).filter(move |&i| moves(param, &unknowns[i]));
+            let free: Vec<usize> = shares.iter().flat_map(|&share| of(share)).collect();
+            let is_held = |share: &&Param| of(**share).next().is_none();
+            let held: f64 =
+                shares.iter().filter(is_held).map(|&share| origin.params.rgb(share)[channel]).sum();
+            let start: f64 = free.iter().map(|&i| unknowns[i].get(origin)).sum();
+            // Channels that are tied make one sum.
+            let most = (1.0 - held).max(start);
+            match found.iter_mut().find(|(other, _)| *other == free) {
+                Some((_, least)) => *least = least.min(most).max(start),
+                None if !free.is_empty() => found.push((free, most)),
+                None => {}
+            }
+        }
+    }
+    found
 }
 
 fn inward(unknown: &Unknown, value: f64) -> f64 {

@@ -252,8 +252,7 @@ fn run_unbounded(kind: SolverKind, log: &mut Log<'_>) -> Result<(), FitError> {
 /// Whether the gradient, projected onto the bounds and scaled by the curvatures, has nothing left to
 /// say: the undamped step within the bounds, g'(J'J)^-1 g long, promises next to nothing.
 fn is_settled(log: &mut Log<'_>, model: &Linearisation) -> bool {
-    let (down, up) = log.passes.coordinates().room(&model.at);
-    let step = bounded::minimise(&model.hessian, &model.gradient, &down, &up);
+    let step = bounded::minimise(&model.hessian, &model.gradient, &log.passes.coordinates().room(&model.at));
     -model.change(&step) <= (LEFT_TO_GAIN * model.loss).max(RESTART_GAIN * log.run().loss_start)
 }
 

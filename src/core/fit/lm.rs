@@ -151,8 +151,7 @@ impl<'a> LevenbergMarquardt<'a> {
                 hessian[i * base.len() + i] += damping * self.memory.scaling[i];
             }
         }
-        let (down, up) = self.coordinates.room(&base.at);
-        bounded::minimise(&hessian, &base.gradient, &down, &up)
+        bounded::minimise(&hessian, &base.gradient, &self.coordinates.room(&base.at))
     }
 
     /// The damped unknowns' part of a step, in units of D.
@@ -264,8 +263,8 @@ impl<'a> LevenbergMarquardt<'a> {
     /// Whether an undamped step promises less than half as much at `trial` as at the base.
     fn nears(&self, trial: &Linearisation) -> bool {
         let outlook = |model: &Linearisation| {
-            let (down, up) = self.coordinates.room(&model.at);
-            -model.change(&bounded::minimise(&model.hessian, &model.gradient, &down, &up))
+            let room = self.coordinates.room(&model.at);
+            -model.change(&bounded::minimise(&model.hessian, &model.gradient, &room))
         };
         outlook(&self.reduced(trial.clone()).0) < 0.5 * outlook(&self.memory.base)
     }

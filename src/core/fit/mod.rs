@@ -2,7 +2,7 @@
 //!
 //! - [`options`]: how a fit is to be done; `error`: why it cannot be
 //! - [`coordinates`], [`linearisation`]: what solvers step in, and what one pass tells them
-//! - [`bounded`]: the bounded least-squares step
+//! - [`bounded`]: the bounded least-squares step; [`room`]: where it may go
 //! - [`lm`], [`memory`]: Levenberg-Marquardt; [`varpro`]: what makes it variable projection
 //! - [`transform`], [`unbounded`]: bounds and costs for `argmin`'s own solvers
 //! - `adam`: Adam, as one of `argmin`'s solvers
@@ -33,6 +33,7 @@ pub mod options;
 pub mod outcome;
 pub mod params_file;
 pub mod profile;
+pub mod room;
 pub mod sandwich;
 pub mod starts;
 pub mod state;
@@ -86,7 +87,7 @@ pub fn fit_watched(
     watch: &mut dyn FnMut(&Iteration, &Point),
 ) -> Result<Outcome, FitError> {
     let clock = Instant::now();
-    let coordinates = Coordinates::within(objective.unknowns(), start, &options.bounds);
+    let coordinates = Coordinates::within(objective.unknowns(), start, options.limits());
     check_bounds(&coordinates, start)?;
     let saved = match &options.resume {
         Some(path) => Saved::read(path, objective.unknowns(), start, options)?,
@@ -180,7 +181,7 @@ fn conclude(
     let untouched = Run::beginning(saved.origin.clone());
     let best = best.unwrap_or(&untouched);
     let model = best.model().unwrap_or(&saved.origin);
-    let at_bound: Vec<bool> = (0..model.len()).map(|i| is_at_bound(coordinates, i, best.at[i])).collect();
+    let at_bound = at_bounds(coordinates, &best.at);
     let end = coordinates.point(&best.at);
     let stop = || options.interrupt.as_ref().is_some_and(|flag| flag.load(Ordering::SeqCst));
     let wanted = !options.widths.is_empty() && !model.is_empty() && !stop();
@@ -212,6 +213,7 @@ fn conclude(
         errors: known.basis,
         profile,
         undetermined: known.undetermined,
+        full_shares: full_shares(coordinates, &best.at, &at_bound),
         history: best.history.clone(),
         iterations: best.iterations,
         evaluations: saved.evaluations,
@@ -238,6 +240,25 @@ fn profile_of(
     let answer = Answer { model, errors: &errors, unit: &known.unit };
     let weakest = profile::weakest(coordinates, &answer)?;
     profile::profile(&Passes::new(objective, coordinates, 0), &answer, weakest, stop)
+}
+
+/// Which unknowns a bound holds, be it that shares beside it, all of them held, leave it no more.
+fn at_bounds(coordinates: &Coordinates, at: &[f64]) -> Vec<bool> {
+    let mut held: Vec<bool> = (0..at.len()).map(|i| is_at_bound(coordinates, i, at[i])).collect();
+    for of in coordinates.full(at) {
+        let mut free = of.iter().filter(|&&i| !held[i]);
+        if let (Some(&last), None) = (free.next(), free.next()) {
+            held[last] = true;
+        }
+    }
+    held
+}
+
+/// The full sums of shares, but for unknowns that are held by bounds.
+fn full_shares(coordinates: &Coordinates, at: &[f64], at_bound: &[bool]) -> Vec<Vec<String>> {
+    let name = |i: &usize| coordinates.unknowns()[*i].name();
+    let free = |of: &[usize]| of.iter().filter(|&&i| !at_bound[i]).map(name).collect::<Vec<_>>();
+    coordinates.full(at).map(free).filter(|names| names.len() > 1).collect()
 }
 
 fn is_at_bound(coordinates: &Coordinates, i: usize, at: f64) -> bool {

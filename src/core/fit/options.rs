@@ -6,8 +6,10 @@ use std::sync::atomic::AtomicBool;
 
 use serde::{Deserialize, Serialize};
 
+use super::coordinates::Limits;
 use super::fingerprint::Fingerprint;
 use crate::model::bounds::Bounds;
+use crate::model::effects::Effects;
 
 /// The solvers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
@@ -108,6 +110,8 @@ pub struct FitOptions {
     pub seed: u64,
     /// What scenes bound their free parameters by: one for each, or none.
     pub bounds: Vec<Bounds>,
+    /// The effects whose parameters count as shares of a whole; all where it is not said.
+    pub effects: Option<Effects>,
     /// What identifies the objective: states of others are refused.
     pub fingerprint: Fingerprint,
     /// Where the state is kept, written about once a second and at the end.
@@ -132,6 +136,7 @@ impl Default for FitOptions {
             starts: 1,
             seed: 0,
             bounds: Vec::new(),
+            effects: None,
             fingerprint: Fingerprint::default(),
             state: None,
             resume: None,
@@ -139,5 +144,13 @@ impl Default for FitOptions {
             widths: Vec::new(),
             profile: false,
         }
+    }
+}
+
+impl FitOptions {
+    /// What bounds unknowns beside the table of parameters.
+    #[must_use]
+    pub fn limits(&self) -> Limits<'_> {
+        Limits { bounds: &self.bounds, effects: self.effects }
     }
 }

@@ -29,6 +29,8 @@ pub struct Outcome {
     pub profile: Option<Profile>,
     /// Directions in which the loss does not change: the images cannot determine these.
     pub undetermined: Vec<Direction>,
+    /// Unknowns that are shares of a whole and add up to all that there is, by their names; those of each whole together.
+    pub full_shares: Vec<Vec<String>>,
     /// The loss after each iteration.
     pub history: Vec<Iteration>,
     /// Iterations of the start that won.

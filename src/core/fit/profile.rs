@@ -196,9 +196,9 @@ fn others(coordinates: &Coordinates, model: &Linearisation, i: usize, damping: f
     let k = model.len();
     let mut hessian = model.hessian.clone();
     (0..k).for_each(|j| hessian[j * k + j] *= 1.0 + damping);
-    let (mut down, mut up) = coordinates.room(&model.at);
-    (down[i], up[i]) = (0.0, 0.0);
-    bounded::minimise(&hessian, &model.gradient, &down, &up)
+    let mut room = coordinates.room(&model.at);
+    room.hold(i);
+    bounded::minimise(&hessian, &model.gradient, &room)
 }
 
 #[cfg(test)]

@@ -29,7 +29,10 @@ pub fn draw(coordinates: &Coordinates, seed: u64, index: u32) -> Vec<f64> {
     let unknowns = coordinates.unknowns().iter().zip(coordinates.bounds());
     let drawn: Vec<f64> = unknowns.zip(given).map(one).collect();
     let bounds = coordinates.lower().iter().zip(coordinates.upper());
-    drawn.iter().zip(bounds).map(|(u, (lower, upper))| u.clamp(*lower, *upper)).collect()
+    let mut drawn: Vec<f64> =
+        drawn.iter().zip(bounds).map(|(u, (lower, upper))| u.clamp(*lower, *upper)).collect();
+    coordinates.share_out(&mut drawn);
+    drawn
 }
 
 fn draw_one(unknown: &Unknown, (lower, upper): (f64, f64), given: f64, rng: &mut StdRng) -> f64 {

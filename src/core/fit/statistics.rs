@@ -2,7 +2,7 @@
 //! cannot determine.
 //!
 //! With weights w, residuals r and n of them above weight 0, and K the rank of J over the unknowns
-//! that no bound holds:
+//! that no bound holds (along shares of a whole that add up to all of it, where such are):
 //!
 //! - `s^2 = sum(w r^2) / (n - K)`: the variance of a residual of unit weight. Scaling all weights
 //!   changes neither this over `J'WJ` nor anything below.
@@ -27,7 +27,7 @@
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
-use super::bounded::NULL_EIGENVALUE;
+use super::bounded::{NULL_EIGENVALUE, projection};
 use super::coordinates::Coordinates;
 use super::error_basis::ErrorBasis;
 use super::linearisation::Linearisation;
@@ -72,7 +72,7 @@ impl Statistics {
         let identifiable = null.identifiable(k);
         let known: Vec<usize> = (0..k).filter(|&i| identifiable[i] && !at_bound[i]).collect();
         let slope: Vec<f64> = (0..k).map(|i| coordinates.slope(i, model.at[i])).collect();
-        let Inverse { matrix, rank } = inverse(model, at_bound);
+        let Inverse { matrix, rank } = inverse(model, at_bound, coordinates);
         let left = model.count.checked_sub(rank as u64).filter(|&left| left > 0);
         let variance = left.map(|left| (model.residual / left as f64).max(rounding));
         let is_rounding = left.is_some_and(|left| model.residual / left as f64 <= rounding);
@@ -113,14 +113,18 @@ struct Inverse {
     rank: usize,
 }
 
-/// `(J'WJ)^+` over the unknowns that no bound holds, zero elsewhere.
-fn inverse(model: &Linearisation, at_bound: &[bool]) -> Inverse {
+/// `(J'WJ)^+` over the unknowns that no bound holds, zero elsewhere; along steps that leave full sums of shares as they
+/// are.
+fn inverse(model: &Linearisation, at_bound: &[bool], coordinates: &Coordinates) -> Inverse {
     let k = model.len();
     if model.is_empty() {
         return Inverse { matrix: DMatrix::zeros(k, k), rank: 0 };
     }
     let (scaled, inverse) = unit_diagonal(model, |i| !at_bound[i]);
-    let eigen = SymmetricEigen::new(scaled);
+    let full: Vec<&[usize]> = coordinates.full(&model.at).collect();
+    let rows = DMatrix::from_fn(full.len(), k, |s, i| if full[s].contains(&i) { inverse[i] } else { 0.0 });
+    let face = projection(&rows);
+    let eigen = SymmetricEigen::new(if full.is_empty() { scaled } else { &face * scaled * &face });
     let threshold = NULL_EIGENVALUE * eigen.eigenvalues.max();
     let inverted = eigen.eigenvalues.map(|value| if value > threshold { 1.0 / value } else { 0.0 });
     let rank = inverted.iter().filter(|&&value| value > 0.0).count();

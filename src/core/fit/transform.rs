@@ -28,6 +28,8 @@ pub struct Transform {
     shapes: Vec<Shape>,
     unit: Vec<f64>,
     start: Vec<f64>,
+    /// Who knows what shares of a whole may add up to: beyond it they are lowered alike.
+    within: Coordinates,
 }
 
 impl Transform {
@@ -45,7 +47,7 @@ impl Transform {
             })
             .collect();
         let start = raw.iter().zip(&unit).map(|(y, u)| y / u).collect();
-        Self { shapes, unit, start }
+        Self { shapes, unit, start, within: coordinates.clone() }
     }
 
     /// The free variables where the solver starts.
@@ -57,13 +59,21 @@ impl Transform {
     /// The coordinates at free variables `y`.
     #[must_use]
     pub fn coordinates(&self, y: &[f64]) -> Vec<f64> {
-        self.shapes.iter().zip(y).zip(&self.unit).map(|((shape, y), unit)| shape.value(y * unit)).collect()
+        let mut at = self.in_intervals(y);
+        self.within.share_out(&mut at);
+        at
     }
 
     /// The gradient with respect to the free variables, from that with respect to coordinates.
     #[must_use]
     pub fn pull_back(&self, y: &[f64], gradient: &[f64]) -> Vec<f64> {
+        let mut gradient = gradient.to_vec();
+        self.within.share_out_pulled_back(&self.in_intervals(y), &mut gradient);
         (0..y.len()).map(|i| gradient[i] * self.shapes[i].slope(y[i] * self.unit[i]) * self.unit[i]).collect()
+    }
+
+    fn in_intervals(&self, y: &[f64]) -> Vec<f64> {
+        self.shapes.iter().zip(y).zip(&self.unit).map(|((shape, y), unit)| shape.value(y * unit)).collect()
     }
 
     /// The corners of a first simplex: the start, and a step along each variable by which the image

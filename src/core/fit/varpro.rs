@@ -52,8 +52,8 @@ impl Elimination {
         let pick = |all: &[f64]| -> Vec<f64> { self.linear.iter().map(|&i| all[i]).collect() };
         let rows = self.linear.iter().map(|&i| &model.hessian[i * model.len()..]);
         let hessian: Vec<f64> = rows.flat_map(pick).collect();
-        let (down, up) = coordinates.room(&model.at);
-        let block = bounded::minimise(&hessian, &pick(&model.gradient), &pick(&down), &pick(&up));
+        let room = coordinates.room(&model.at).of(&self.linear);
+        let block = bounded::minimise(&hessian, &pick(&model.gradient), &room);
         let mut step = vec![0.0; model.len()];
         let mut moved: f64 = 0.0;
         for (&i, &d) in self.linear.iter().zip(&block) {

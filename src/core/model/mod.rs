@@ -2,7 +2,7 @@
 //! the kinds of numbers that they are computed in. The formulas themselves are the rules' (`shader/rules`).
 //!
 //! - [`params`]: the one table of parameters; `columns`: which of their channels are free together;
-//!   [`bounds`]: what a scene bounds them by
+//!   [`bounds`]: what a scene bounds them by; [`shares`]: those that add up to no more than 1
 //! - [`readings`]: how the paper is read; [`effects`]: what can be switched on; [`needs`]: what each effect asks for;
 //!   [`terms`]: parts of the sum
 //! - [`choices`]: which way is taken where there are several; [`diffusion`], [`transmission`]: those of light that scatters
@@ -38,6 +38,7 @@ pub mod readings;
 pub mod real;
 pub mod registry;
 pub mod shadow_filter;
+pub mod shares;
 pub mod terms;
 pub mod texture_filter;
 pub mod transmission;

@@ -101,6 +101,8 @@ pub struct ParamInfo {
     pub held: bool,
     /// Whether its start is what its scene gives elsewhere: files hold it only where it was free.
     pub found: bool,
+    /// The whole that it is a share of: with the other shares of the same it adds up to no more than 1, in each channel.
+    pub share: Option<&'static str>,
     /// It is asked for when one of these effects is enabled.
     pub effects: &'static [Effect],
     /// Where it comes from.
@@ -137,7 +139,7 @@ macro_rules! row {
      $rgb:literal, $linear:literal, $scale:ident, [$($effect:ident),*], $source:literal, $meaning:literal) => {
         ParamInfo {
             param: Param::$param, name: $name, identifier: $name, listing: $listing, corrected: $corrected, channels: None, lower: $lower, upper: $upper,
-            unit: $unit, rgb: $rgb, linear: $linear, scale: Scale::$scale, owner: Owner::Skin, held: false, found: false, effects: &[$(Effect::$effect),*],
+            unit: $unit, rgb: $rgb, linear: $linear, scale: Scale::$scale, owner: Owner::Skin, held: false, found: false, share: None, effects: &[$(Effect::$effect),*],
             source: $source, meaning: $meaning,
         }
     };

@@ -8,6 +8,7 @@ use crate::engine::joint::{Joint, label};
 use crate::engine::view::ObservedView;
 use crate::engine::{Engine, Point, Task};
 use crate::model::bounds::Bounds;
+use crate::model::effects::Effects;
 use crate::model::params::{Param, Params};
 
 /// A scene that is ready to be fitted with others.
@@ -109,6 +110,13 @@ impl JointScenes {
     #[must_use]
     pub fn bounds(&self) -> Vec<Bounds> {
         self.fitted().map(|part| part.baked.scene.fit.bounds.clone()).collect()
+    }
+
+    /// The effects of the fitted scenes: what is shared over scenes is asked for by one of them.
+    #[must_use]
+    pub fn effects(&self) -> Effects {
+        self.fitted()
+            .fold(Effects::of(&[]), |all, part| part.baked.scene.effects.iter().fold(all, Effects::with))
     }
 
     /// Pixels in a row of each fitted view's image.

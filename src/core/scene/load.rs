@@ -28,6 +28,7 @@ use crate::model::evaluate::Setup;
 use crate::model::fields::Fields;
 use crate::model::needs::Needs;
 use crate::model::params::Param;
+use crate::model::shares;
 use crate::progress;
 use crate::shader::term::library;
 
@@ -172,6 +173,9 @@ impl Scene {
         transmission::set(&mut params, metres_per_unit);
         for light in lights.own.iter().chain(&sky_lights) {
             lit::set(light, &mut params, gives);
+        }
+        for message in shares::overfull(&params, effects) {
+            warn(&mut warnings, &source.path, message);
         }
         bar.inc(1);
         let views = read_views(plans, folder, options.targets, &bar, &mut warnings)?;

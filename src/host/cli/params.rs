@@ -48,7 +48,8 @@ fn kind(row: &ParamInfo) -> String {
         (false, Scale::Log) => "non-linear, by its logarithm",
     };
     let owner = if row.owner == Owner::Scene { ", each scene's own" } else { "" };
-    format!("{channels}, {shape}{owner}")
+    let share = row.share.map_or(String::new(), |whole| format!(", a share of {whole}"));
+    format!("{channels}, {shape}{owner}{share}")
 }
 
 /// A default, a channel each where they differ.
@@ -105,7 +106,7 @@ fn json(rows: &[&ParamInfo]) -> String {
             serde_json::json!({
                 "name": row.name, "default": {"corrected": json_default(row, row.corrected), "listing": json_default(row, row.listing)},
                 "bounds": [finite(row.lower), finite(row.upper)], "unit": row.unit,
-                "rgb": row.rgb, "linear": row.linear, "owner": row.owner.name(), "effects": effects,
+                "rgb": row.rgb, "linear": row.linear, "share": row.share, "owner": row.owner.name(), "effects": effects,
                 "source": row.source, "meaning": row.meaning,
             })
         })

@@ -98,7 +98,8 @@ impl Judge<'_> {
     ) -> Result<Point, StudyError> {
         let engine = CpuEngine::new(baked.task_over(views))?;
         let start = Point { gains, ..baked.start() };
-        let options = FitOptions { bounds: vec![baked.scene.fit.bounds.clone()], ..FitOptions::default() };
+        let bounds = vec![baked.scene.fit.bounds.clone()];
+        let options = FitOptions { bounds, effects: Some(baked.scene.effects), ..FitOptions::default() };
         let outcome = fit::fit(&engine, &start, &options, &mut |_| {});
         let scene = || self.scene.display().to_string();
         Ok(outcome.map_err(|error| StudyError::Fit { scene: scene(), error })?.end)

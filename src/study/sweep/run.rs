@@ -44,6 +44,7 @@ fn run_fit(job: &Job, scene: &Path, cache: Option<&Path>) -> Result<Figures, Job
         starts: job.whole("starts").and_then(|n| u32::try_from(n).ok()).unwrap_or(1),
         seed: job.whole("seed").unwrap_or(0),
         bounds: vec![observed.scene.fit.bounds.clone()],
+        effects: Some(observed.scene.effects),
         widths: observed.image_widths(),
         ..FitOptions::default()
     };

@@ -173,7 +173,9 @@ impl<'a> Fixed<'a> {
             unknowns: self.unknowns.clone(),
         })?;
         let bounds = vec![self.scene.fit.bounds.clone()];
-        let options = FitOptions { bounds, interrupt: self.interrupt.clone(), ..FitOptions::default() };
+        let effects = Some(self.setup.effects);
+        let options =
+            FitOptions { bounds, effects, interrupt: self.interrupt.clone(), ..FitOptions::default() };
         let outcome = fit::fit(&engine, start, &options, &mut |_| {})?;
         Ok((outcome.end, (outcome.loss_start, outcome.loss_end)))
     }

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 
 use super::image::Picture;
 use crate::fit::bounded;
+use crate::fit::room::Room;
 
 /// Covered by more is covered wholly; of less, what shows is of the border.
 const WHOLE: f32 = 0.999;
@@ -205,7 +206,7 @@ fn least_squares(covariance: &DMatrix<f64>) -> Vec<f64> {
     let normal: Vec<f64> =
         (0..count).flat_map(|j| (0..count).map(move |k| covariance[(j.min(k), j.max(k))])).collect();
     let downhill: Vec<f64> = (0..count).map(|k| -covariance[(k, count)]).collect();
-    bounded::minimise(&normal, &downhill, &vec![0.0; count], &vec![f64::INFINITY; count])
+    bounded::minimise(&normal, &downhill, &Room::within(&vec![0.0; count], &vec![f64::INFINITY; count]))
 }
 
 #[cfg(test)]

@@ -56,6 +56,8 @@ pub(super) struct DeclaredParameter {
     pub(super) owner: Owner,
     pub(super) held: bool,
     pub(super) found: bool,
+    /// The whole that it is a share of.
+    pub(super) share: Option<&'static str>,
     /// The effect of the file's that asks for it, where not all do.
     pub(super) of: Option<&'static str>,
     /// The effects that show nothing where it is 0 in every channel.
@@ -213,7 +215,7 @@ impl Declaration {
         if !self.rules.is_empty() {
             return Err(misplaced("parameter"));
         }
-        let wanted = "NAME = DEFAULT in [LOWER, UPPER], then `, rgb`, `, linear`, `, log`, `, scene`, `, of EFFECT`, `, weighs EFFECT` or `, unit UNIT` where \
+        let wanted = "NAME = DEFAULT in [LOWER, UPPER], then `, rgb`, `, linear`, `, log`, `, scene`, `, of EFFECT`, `, weighs EFFECT`, `, share of WHOLE` or `, unit UNIT` where \
                       they hold, then `; what it does; where it comes from`. The default lies within the bounds";
         let parameter = parameter(value)
             .ok_or_else(|| Problem::Value { key: "parameter", given: value.to_owned(), wanted }.at(line))?;
@@ -378,6 +380,7 @@ fn parameter(value: &'static str) -> Option<DeclaredParameter> {
         owner: Owner::Skin,
         held: false,
         found: false,
+        share: None,
         of: None,
         weighs: &[],
         meaning,
@@ -393,6 +396,7 @@ fn parameter(value: &'static str) -> Option<DeclaredParameter> {
             "found" => (parameter.found, parameter.owner) = (true, Owner::Scene),
             other => match other.split_once(' ')? {
                 ("of", effect) => parameter.of = Some(effect.trim()),
+                ("share", whole) => parameter.share = Some(whole.strip_prefix("of ")?.trim()),
                 ("weighs", effect) => {
                     parameter.weighs = [parameter.weighs, &[effect.trim()]].concat().leak();
                 }
@@ -406,7 +410,11 @@ fn parameter(value: &'static str) -> Option<DeclaredParameter> {
     let coloured = rgb || parameter.channels.is_none();
     // Logarithms are of positive numbers, and a linear parameter is solved for by its value.
     let steps = scale == Scale::Linear || (lower > 0.0 && !linear);
-    (within && coloured && lower < upper && steps && !meaning.is_empty()).then_some(parameter)
+    // Shares add up by their values, and none takes from another.
+    let of_skin = parameter.owner == Owner::Skin;
+    let adds_up = |whole: &str| !whole.is_empty() && scale == Scale::Linear && lower >= 0.0 && of_skin;
+    let shared = parameter.share.is_none_or(adds_up);
+    (within && coloured && lower < upper && steps && shared && !meaning.is_empty()).then_some(parameter)
 }
 
 #[cfg(test)]
@@ -491,6 +499,10 @@ mod tests {
             ("rgb, linear", "rgb, linaer"),
             ("[1, 90]", "[0, 90]"),
             ("; how wide", ""),
+            ("in [1, 90], log", "in [1, 90], log, share of sheen"),
+            ("rgb, linear;", "rgb, linear, share of;"),
+            ("rgb, linear;", "rgb, linear, scene, share of sheen;"),
+            ("[0, inf), rgb", "[-1, inf), rgb, share of sheen"),
             ("[1, 90]", "[90, 1]"),
         ] {
             assert!(matches!(swap(old, new).problem, Problem::Value { key: "parameter", .. }), "{new}");

@@ -222,6 +222,7 @@ fn enter(origin: Origin, declaration: Declaration, text: &'static str) -> Result
             owner: declared.owner,
             held: declared.held,
             found: declared.found,
+            share: declared.share,
             effects: asking(effects, declared.of),
             source: declared.source,
             meaning: declared.meaning,

@@ -71,6 +71,7 @@ pub(super) fn solve(
         starts: solving.starts,
         seed: solving.seed,
         bounds: scenes.bounds(),
+        effects: Some(scenes.effects()),
         fingerprint: fingerprint_of(scenes),
         resume: arguments.resume.then(|| state.clone()),
         state: (!maps).then_some(state),

@@ -132,6 +132,7 @@ impl Fits {
                 solver: *solver,
                 max_iterations: Some(MOST_ITERATIONS),
                 bounds: self.subject.scenes.bounds(),
+                effects: Some(self.subject.scenes.effects()),
                 ..FitOptions::default()
             };
             let outcome = fit::fit(&objective, &start, &options, &mut |_| {})

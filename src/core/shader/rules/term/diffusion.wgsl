@@ -3,11 +3,11 @@
 //
 // effect: diffusion asks atlas shares light, light that scatters within the skin
 // effect: diffusion_five within diffusion, two blurs more, as the human head demo has five
-// parameter: diffusion_weight_1 = (0.23, 0.21, 0.01) in [0, 1], rgb, linear; share of the light in level 1; GPU Gems 3, chapter 14
-// parameter: diffusion_weight_2 = (0.36, 0, 0) in [0, 1], rgb, linear; share of the light in level 2; GPU Gems 3, chapter 14
-// parameter: diffusion_weight_3 = (0.08, 0, 0) in [0, 1], rgb, linear; share of the light in level 3; GPU Gems 3, chapter 14
-// parameter: diffusion_weight_4 = 0 in [0, 1], rgb, linear, of diffusion_five; share of the light in level 4; GPU Gems 3, chapter 14
-// parameter: diffusion_weight_5 = 0 in [0, 1], rgb, linear, of diffusion_five; share of the light in level 5; GPU Gems 3, chapter 14
+// parameter: diffusion_weight_1 = (0.23, 0.21, 0.01) in [0, 1], rgb, linear, share of diffused_light; share of the light in level 1; GPU Gems 3, chapter 14
+// parameter: diffusion_weight_2 = (0.36, 0, 0) in [0, 1], rgb, linear, share of diffused_light; share of the light in level 2; GPU Gems 3, chapter 14
+// parameter: diffusion_weight_3 = (0.08, 0, 0) in [0, 1], rgb, linear, share of diffused_light; share of the light in level 3; GPU Gems 3, chapter 14
+// parameter: diffusion_weight_4 = 0 in [0, 1], rgb, linear, share of diffused_light, of diffusion_five; share of the light in level 4; GPU Gems 3, chapter 14
+// parameter: diffusion_weight_5 = 0 in [0, 1], rgb, linear, share of diffused_light, of diffusion_five; share of the light in level 5; GPU Gems 3, chapter 14
 // parameter: diffusion_radius_1 = 0.6 in [0.02, 30], log, unit mm; standard deviation of blur 1 on the surface; GPU Gems 3, chapter 14
 // parameter: diffusion_radius_2 = 1.2 in [0.02, 30], log, unit mm; standard deviation of blur 2 on the surface; GPU Gems 3, chapter 14
 // parameter: diffusion_radius_3 = 2.6 in [0.02, 30], log, unit mm; standard deviation of blur 3 on the surface; GPU Gems 3, chapter 14

@@ -1,0 +1,71 @@
+//! Parameters that are shares of one whole: in each channel they add up to no more than 1.
+
+use super::effects::Effects;
+use super::params::{Param, Params};
+
+/// By how much a sum may exceed 1: what decimal digits of shares that add up to 1 leave.
+const ROUNDING: f64 = 1e-9;
+
+/// The parameters of each whole, and its name, in the order of the table; of effects that are not enabled none counts,
+/// where it is said which are.
+#[must_use]
+pub fn wholes(effects: Option<Effects>) -> Vec<(&'static str, Vec<Param>)> {
+    let mut wholes: Vec<(&'static str, Vec<Param>)> = Vec::new();
+    for param in Param::all().filter(|param| effects.is_none_or(|effects| param.asked_for(effects))) {
+        let Some(whole) = param.info().share else { continue };
+        match wholes.iter_mut().find(|(name, _)| *name == whole) {
+            Some((_, params)) => params.push(param),
+            None => wholes.push((whole, vec![param])),
+        }
+    }
+    wholes
+}
+
+/// What is wrong with shares that add up to more than 1, in words, each whole and channel a sentence without its end.
+#[must_use]
+pub fn overfull(params: &Params, effects: Effects) -> Vec<String> {
+    let mut told = Vec::new();
+    for (whole, shares) in wholes(Some(effects)) {
+        for (channel, name) in ["red", "green", "blue"].into_iter().enumerate() {
+            let total: f64 = shares.iter().map(|share| params.rgb(*share)[channel]).sum();
+            if total > 1.0 + ROUNDING {
+                let names: Vec<&str> = shares.iter().map(|share| share.name()).collect();
+                told.push(format!(
+                    "{} add up to {total:.4} in {name}, more than the whole of {whole}: lower them to 1 or less together",
+                    names.join(", ")
+                ));
+            }
+        }
+    }
+    told
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::effects::{Effect, Form};
+    use crate::shader::term::library;
+
+    #[test]
+    fn shares_of_enabled_effects_count_and_sums_above_one_are_told() {
+        library::register_all();
+        let [diffusion, five] = ["diffusion", "diffusion_five"].map(|name| Effect::from_name(name).unwrap());
+        let three = Effects::of(&[]).with(diffusion);
+        let counted =
+            |effects: Effects| wholes(Some(effects)).iter().map(|(_, shares)| shares.len()).sum::<usize>();
+        assert_eq!([counted(Effects::of(&[])), counted(three), counted(three.with(five))], [0, 3, 5]);
+        let [first, last] =
+            ["diffusion_weight_1", "diffusion_weight_5"].map(|name| Param::from_name(name).unwrap());
+        let mut params = Params::defaults(Form::Corrected);
+        assert!(overfull(&params, three).is_empty());
+        params.set_rgb(last, [0.0, 0.9, 0.0]);
+        assert!(overfull(&params, three).is_empty(), "of an effect that is off");
+        let told = overfull(&params, three.with(five));
+        assert!(told.len() == 1 && told[0].contains("add up to 1.1100 in green"), "{told:?}");
+        // 0.23 is the default's red, which leaves 0.77 beside 0.36 and 0.08.
+        params.set_rgb(first, [0.56, 0.0, 1.0]);
+        assert!(overfull(&params, three).is_empty(), "as many digits as add up to 1");
+        params.set_rgb(first, [0.57, 0.0, 1.0]);
+        assert!(overfull(&params, three)[0].contains("1.0100 in red"));
+    }
+}
