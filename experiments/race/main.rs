@@ -2,7 +2,7 @@
 //! other frameworks do them. Reads a data folder, writes one row of the table as JSON.
 //!
 //! `cargo run --release --example race -- DATA_DIR [--mode sampled|pre] [--engine cpu|gpu] -o row.json`
-//! `cargo run --release --example race -- DATA_DIR --diffusion -o row.json`
+//! `cargo run --release --example race -- DATA_DIR --diffusion [--engine cpu|gpu] -o row.json`
 //!
 //! - this module: the surface model; [`diffusion`]: light that scatters within the skin, which has data of its own
 //! - `data`: the folder of the first; `racer`: both engines; `measure`: what both races measure with
@@ -42,7 +42,7 @@ struct Arguments {
     #[arg(long, default_value = "cpu", value_parser = ["cpu", "gpu"])]
     engine: String,
     /// The data is that of the race of texture-space diffusion.
-    #[arg(long, conflicts_with_all = ["mode", "engine"])]
+    #[arg(long, conflicts_with = "mode")]
     diffusion: bool,
     /// Where the row is written; standard output when left out.
     #[arg(short, long)]
@@ -75,13 +75,17 @@ fn engine(arguments: &Arguments, manifest: &Manifest, which: &str, keep: bool) -
         let engine = CpuEngine::with_kept_terms(task, keep);
         return Ok(Box::new(engine.map_err(|error| error.to_string())?));
     }
-    let words = |error: skinfit::gpu::GpuError| error.to_string();
-    let gpu = skinfit::gpu::Gpu::open(&skinfit::gpu::Choice::default()).map_err(words)?;
+    let gpu = adapter()?;
     let start = Point { params: Manifest::params(&manifest.params_true), gains: vec![1.0.into()] };
-    let engine = GpuEngine::new(&gpu, task, &start, Memory::default()).map_err(words)?;
+    let engine = GpuEngine::new(&gpu, task, &start, Memory::default()).map_err(|error| error.to_string())?;
     let (resident, _) = engine.bytes();
     eprintln!("race: {:.1} bytes a pixel on the device", resident as f64 / manifest.pixels as f64);
     Ok(Box::new(engine))
+}
+
+/// The adapter that is here.
+fn adapter() -> Result<skinfit::gpu::Gpu> {
+    skinfit::gpu::Gpu::open(&skinfit::gpu::Choice::default()).map_err(|error| error.to_string())
 }
 
 /// Pixels that the coarse stage of a fit reads, about.
@@ -162,7 +166,9 @@ fn fits(arguments: &Arguments, manifest: &Manifest, start: &Point) -> Result<Val
 fn run(arguments: &Arguments) -> Result<Value> {
     if arguments.diffusion {
         let Arguments { data, reps, passes_only, .. } = arguments;
-        return diffusion::run(&diffusion::Options { folder: data, reps: *reps, passes_only: *passes_only });
+        let gpu = if arguments.engine == "gpu" { Some(adapter()?) } else { None };
+        let (reps, passes_only) = (*reps, *passes_only);
+        return diffusion::run(&diffusion::Options { folder: data, reps, passes_only, gpu });
     }
     let manifest = Manifest::read(&arguments.data)?;
     let pre = arguments.mode == "pre";

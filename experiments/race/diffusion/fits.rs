@@ -4,14 +4,14 @@ use std::time::Instant;
 
 use serde_json::{Value, json};
 use skinfit::engine::Point;
-use skinfit::engine::cpu::CpuEngine;
 use skinfit::fit::{FitOptions, SolverKind, fit};
 
 use super::data::{Data, Manifest, vector};
 use super::secant::Secant;
 use super::window::Window;
-use super::{engine, point};
+use super::{Options, engine, point};
 use crate::data::Result;
+use crate::racer::Racer;
 
 /// Texels along a side of the window.
 const SIDE: usize = 80;
@@ -34,10 +34,10 @@ struct Run {
 
 /// Engines over the window and over all of a target.
 struct Engines {
-    part: CpuEngine,
+    part: Box<dyn Racer>,
     /// Its share of the pixels.
     share: f64,
-    whole: CpuEngine,
+    whole: Box<dyn Racer>,
 }
 
 /// How far `point` is from the race's criterion, and how far it may be: the worst relative error of a parameter (clean), or
@@ -74,35 +74,36 @@ fn fit_to_criterion(engines: &Engines, manifest: &Manifest, which: &str, start: 
     let clock = Instant::now();
     let options =
         FitOptions { solver: SolverKind::Lm, max_iterations: Some(ON_WINDOW), ..FitOptions::default() };
-    let part = fit(&engines.part, start, &options, &mut |_| {}).map_err(|error| error.to_string())?;
+    let part = fit(&*engines.part, start, &options, &mut |_| {}).map_err(|error| error.to_string())?;
     let mut evaluations = part.evaluations as f64 * engines.share;
     let (mut point, mut best) = (part.end, f64::INFINITY);
-    let mut secant = Secant::new(&engines.whole, &point);
+    let mut secant = Secant::new(&*engines.whole, &point);
     for _ in 0..=MOST {
         let (error, tolerance) = criterion(manifest, which, &point)?;
         best = best.min(error);
         if error < tolerance {
             return Ok(Run { seconds: Some(clock.elapsed().as_secs_f64()), evaluations, best });
         }
-        point = secant.step(&engines.whole);
+        point = secant.step(&*engines.whole);
         evaluations += 1.0;
     }
     Ok(Run { seconds: None, evaluations, best })
 }
 
 /// The fits of both targets.
-pub(super) fn fits(data: &Data, manifest: &Manifest, reps: usize) -> Result<Value> {
+pub(super) fn fits(data: &Data, manifest: &Manifest, options: &Options<'_>) -> Result<Value> {
     let start = point(&manifest.params_init)?;
-    let window = window(data, manifest);
+    let (window, gpu) = (window(data, manifest), options.gpu.as_ref());
     let mut fits = serde_json::Map::new();
     for which in ["clean", "noisy"] {
         let part = data.view(which, Some(&window))?;
         let groups = |view: &skinfit::engine::view::ObservedView| view.samples.groups() as f64;
         let whole = data.view(which, None)?;
         let share = groups(&part) / groups(&whole);
-        let engines = Engines { part: engine(part, true)?, share, whole: engine(whole, true)? };
+        let [part, whole] = [part, whole].map(|view| engine(gpu, view, true, &start));
+        let engines = Engines { part: part?, share, whole: whole? };
         let (mut seconds, mut evaluations, mut best) = (Vec::new(), 0.0, 0.0);
-        let runs = reps.max(5);
+        let runs = options.reps.max(5);
         // The first is not counted: it is what other frameworks compile in.
         for run in 0..=runs {
             let found = fit_to_criterion(&engines, manifest, which, &start)?;

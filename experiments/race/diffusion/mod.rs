@@ -17,23 +17,28 @@ use std::time::Instant;
 use serde_json::{Value, json};
 use skinfit::bake::Illumination;
 use skinfit::engine::cpu::CpuEngine;
+use skinfit::engine::gpu::{GpuEngine, Memory};
 use skinfit::engine::view::ObservedView;
-use skinfit::engine::{Objective, Point, Task};
+use skinfit::engine::{Point, Task};
+use skinfit::gpu::Gpu;
 use skinfit::scene::Loss;
 
 use self::data::{Data, Manifest};
 use crate::data::Result;
 use crate::measure::{peak_rss_mb, timed};
+use crate::racer::Racer;
 
 /// What the race is run with.
 pub(crate) struct Options<'a> {
     pub(crate) folder: &'a Path,
     pub(crate) reps: usize,
     pub(crate) passes_only: bool,
+    /// What makes the passes, where it is not the processor.
+    pub(crate) gpu: Option<Gpu>,
 }
 
 /// An engine over a view, with the race's unknowns or with none: for images.
-fn engine(view: ObservedView, fits: bool) -> Result<CpuEngine> {
+fn engine(gpu: Option<&Gpu>, view: ObservedView, fits: bool, start: &Point) -> Result<Box<dyn Racer>> {
     let task = Task {
         setup: data::setup()?,
         illumination: Arc::new(Illumination::default()),
@@ -41,7 +46,13 @@ fn engine(view: ObservedView, fits: bool) -> Result<CpuEngine> {
         loss: Loss::L2,
         unknowns: if fits { data::unknowns()? } else { Vec::new() },
     };
-    CpuEngine::new(task).map_err(|error| error.to_string())
+    match gpu {
+        None => Ok(Box::new(CpuEngine::new(task).map_err(|error| error.to_string())?)),
+        Some(gpu) => {
+            let engine = GpuEngine::new(gpu, task, start, Memory::default());
+            Ok(Box::new(engine.map_err(|error| error.to_string())?))
+        }
+    }
 }
 
 fn point(values: &[f64]) -> Result<Point> {
@@ -78,20 +89,21 @@ pub(crate) fn run(options: &Options<'_>) -> Result<Value> {
         fault.map(|()| row)
     };
 
-    let images = engine(data.view("clean", None)?, false)?;
+    let gpu = options.gpu.as_ref();
+    let images = engine(gpu, data.view("clean", None)?, false, &truth)?;
     let inputs = peak_rss_mb();
     let first = Instant::now();
-    let image = images.image(0, &truth);
+    let image = images.image_planes(&truth);
     let first_forward = first.elapsed().as_secs_f64();
     let max_error = max_error(&images.views()[0], &image, manifest.pixels);
     let planes = std::cell::RefCell::new(image);
     let forward = timed_at(&|point| {
-        images.image_into(0, point, &mut planes.borrow_mut());
+        images.forward(point, &mut planes.borrow_mut());
         std::hint::black_box(&*planes.borrow());
     })?;
     drop((images, planes));
 
-    let engine = engine(data.view("clean", None)?, true)?;
+    let engine = engine(gpu, data.view("clean", None)?, true, &truth)?;
     let first = Instant::now();
     engine.gradient(&points.next()?);
     let first_grad = first.elapsed().as_secs_f64();
@@ -101,12 +113,13 @@ pub(crate) fn run(options: &Options<'_>) -> Result<Value> {
     let first_normal = first.elapsed().as_secs_f64();
     let normal = timed_at(&|point| drop(std::hint::black_box(engine.normal_equations(point))))?;
     engine.fault().map_or(Ok(()), Err)?;
+    let (device, version) = (engine.name(), engine.version());
     drop(engine);
     let passes = peak_rss_mb();
-    let fits = if options.passes_only { json!({}) } else { fits::fits(&data, &manifest, options.reps)? };
+    let fits = if options.passes_only { json!({}) } else { fits::fits(&data, &manifest, options)? };
     Ok(json!({
-        "peer": "skinfit", "version": format!("skinfit {} (rustc, f32 lanes)", env!("CARGO_PKG_VERSION")),
-        "texels": manifest.texels, "pixels": manifest.pixels, "device": "cpu",
+        "peer": "skinfit", "version": format!("skinfit {} ({version})", env!("CARGO_PKG_VERSION")),
+        "texels": manifest.texels, "pixels": manifest.pixels, "device": device,
         "threads": rayon::current_num_threads(),
         "forward": forward, "grad": grad, "normal": normal, "fits": fits,
         "first_forward_s": first_forward, "first_grad_s": first_grad, "first_normal_s": first_normal,
