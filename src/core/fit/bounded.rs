@@ -54,8 +54,13 @@ pub fn minimise(hessian: &[f64], gradient: &[f64], room: &Room) -> Vec<f64> {
 /// The least-norm solution of `matrix x = right` for a symmetric positive semi-definite matrix,
 /// ignoring eigenvalues below [`NULL_EIGENVALUE`] times the largest.
 pub(super) fn solve_least_norm(matrix: DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
+    solve_beside(matrix, right, 0.0)
+}
+
+/// The same where eigenvalues are compared with `size`, too.
+fn solve_beside(matrix: DMatrix<f64>, right: &DVector<f64>, size: f64) -> DVector<f64> {
     let eigen = SymmetricEigen::new(matrix);
-    let threshold = NULL_EIGENVALUE * eigen.eigenvalues.max();
+    let threshold = NULL_EIGENVALUE * eigen.eigenvalues.max().max(size);
     let mut along = eigen.eigenvectors.tr_mul(right);
     for (x, &value) in along.iter_mut().zip(&eigen.eigenvalues) {
         *x = if value > threshold { *x / value } else { 0.0 };
@@ -160,7 +165,8 @@ impl Search {
         let matrix = DMatrix::from_fn(free.len(), free.len(), |a, b| self.hessian[(free[a], free[b])]);
         let right = DVector::from_fn(free.len(), |a, _| -slope[free[a]]);
         let along = match self.full_rows(&free).map(|rows| projection(&rows)) {
-            Some(face) => &face * solve_least_norm(&face * matrix * &face, &(&face * right)),
+            // On a corner nothing but roundings is left of the matrix, whose diagonal was of 1.
+            Some(face) => &face * solve_beside(&face * matrix * &face, &(&face * right), 1.0),
             None => solve_least_norm(matrix, &right),
         };
         let mut direction = DVector::zeros(self.place.len());
@@ -338,7 +344,7 @@ mod tests {
     fn summed() -> impl Strategy<Value = (Vec<f64>, Vec<f64>, Room)> {
         (problem(), proptest::collection::vec(0_usize..3, 9), proptest::array::uniform2(0.0..1.0_f64))
             .prop_map(|((k, h, g, lower, upper), group, left)| {
-                let unit: Vec<f64> = (0..k).map(|i| h[i * k + i].sqrt().max(1e-3)).collect();
+                let unit: Vec<f64> = (0..k).map(|i| h[i * k + i].sqrt().max(1e-9)).collect();
                 let room = Room {
                     down: (0..k).map(|i| lower[i] * unit[i]).collect(),
                     up: (0..k).map(|i| upper[i] * unit[i]).collect(),

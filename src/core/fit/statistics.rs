@@ -125,7 +125,9 @@ fn inverse(model: &Linearisation, at_bound: &[bool], coordinates: &Coordinates) 
     let rows = DMatrix::from_fn(full.len(), k, |s, i| if full[s].contains(&i) { inverse[i] } else { 0.0 });
     let face = projection(&rows);
     let eigen = SymmetricEigen::new(if full.is_empty() { scaled } else { &face * scaled * &face });
-    let threshold = NULL_EIGENVALUE * eigen.eigenvalues.max();
+    // On a corner nothing but roundings is left of the matrix, whose diagonal was of 1.
+    let size = if full.is_empty() { 0.0 } else { 1.0 };
+    let threshold = NULL_EIGENVALUE * eigen.eigenvalues.max().max(size);
     let inverted = eigen.eigenvalues.map(|value| if value > threshold { 1.0 / value } else { 0.0 });
     let rank = inverted.iter().filter(|&&value| value > 0.0).count();
     let pseudo_inverse =
