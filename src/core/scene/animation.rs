@@ -5,8 +5,9 @@ use std::path::Path;
 use toml::Spanned;
 
 use super::error::{SceneError, Warnings, warn};
-use super::file::{MapsTable, SceneFile, Source};
+use super::file::{SceneFile, Source};
 use super::gltf::{Ask, Document, SkinMaps, Tangents, TextureUv, Uvs};
+use super::map_layout::MapLayout;
 use super::maps::Maps;
 use super::mesh::Mesh;
 use super::numbers::{interval, number, short};
@@ -19,6 +20,7 @@ use crate::model::needs::Needs;
 pub struct Animation {
     document: Document,
     ask: Ask,
+    layout: Option<MapLayout>,
     /// Seconds from its first key to its last.
     pub seconds: (f64, f64),
 }
@@ -39,7 +41,7 @@ impl Animation {
         let uv = own.map(|own| own.uv()).unwrap_or_default();
         let ask = Ask { uv, ..ask(&scene.maps, scene.form, scene.effects, needs, &pose) };
         let seconds = document.animation_seconds()?;
-        Ok(seconds.map(|seconds| Self { document, ask, seconds }))
+        Ok(seconds.map(|seconds| Self { document, ask, layout: scene.maps.layout, seconds }))
     }
 
     /// The mesh at `time` seconds.
@@ -48,7 +50,12 @@ impl Animation {
     /// When the animation does not fit the mesh.
     pub fn mesh(&self, time: f64) -> Result<Mesh, SceneError> {
         // What is mended was told when the scene was read.
-        self.document.mesh(&Ask { time: Some(time), ..self.ask.clone() }, &mut Warnings::new())
+        let mut mesh =
+            self.document.mesh(&Ask { time: Some(time), ..self.ask.clone() }, &mut Warnings::new())?;
+        if let Some(layout) = self.layout {
+            layout.place(&mut mesh);
+        }
+        Ok(mesh)
     }
 }
 
@@ -157,10 +164,8 @@ pub(super) fn own_maps(
     (pose, needs): (&Pose, Needs),
     warnings: &mut Warnings,
 ) -> Result<Option<SkinMaps>, SceneError> {
-    let MapsTable { color, normal, specular, attenuator, material, .. } = &file.maps;
-    let named = [color, normal, specular, attenuator].into_iter().any(Option::is_some);
     let wanted = (needs.color_map, needs.normal_map);
-    match material.unwrap_or(!named) && wanted != (false, false) {
+    match file.maps.takes_material() && wanted != (false, false) {
         true => document.skin_maps(pose.skin(), wanted, warnings),
         false => Ok(None),
     }

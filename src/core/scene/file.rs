@@ -66,6 +66,14 @@ pub(super) struct MapsTable {
     pub own: BTreeMap<Spanned<String>, PathBuf>,
 }
 
+impl MapsTable {
+    /// Whether maps that are not named are those of the skin's own material.
+    pub(super) fn takes_material(&self) -> bool {
+        let named = [&self.color, &self.normal, &self.specular, &self.attenuator];
+        self.material.unwrap_or(named.into_iter().all(Option::is_none))
+    }
+}
+
 /// `[environment]`
 #[derive(Clone, Debug, serde::Deserialize)]
 #[serde(deny_unknown_fields)]

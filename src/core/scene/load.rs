@@ -4,19 +4,20 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use super::animation::{Pose, ask, idle_effects, mesh_file, own_maps};
+use super::animation::{Pose, ask, idle_effects, mesh_file};
 use super::cameras::{self, MeshCameras, ViewPlan};
 use super::dapple::dapple;
 use super::diffusion;
 use super::error::{SceneError, Warning, Warnings, warn};
 use super::file::{EnvironmentTable, ResponseValue, SceneFile, Source};
-use super::gltf::{Ask, TextureUv};
+use super::gltf::Ask;
 use super::lit::{self, Lights};
 use super::map_files::{normal_flip, read_maps};
 use super::maps::Environment;
 use super::numbers::{interval, number};
 use super::settings::{self, spots};
 use super::shadow_maps::shadow_maps;
+use super::skin_material::SkinMaterial;
 use super::sky_lights::sky_lights;
 use super::terms::terms;
 use super::view::{Background, View};
@@ -126,26 +127,19 @@ impl Scene {
         check_lobe(&source, &file, &setup, &mut warnings);
         let declared = Fields::of(terms.iter().flat_map(|term| term.fields.iter())).of_maps();
         let mut maps = read_maps(&source, &file, folder, (needs, declared), &mut warnings)?;
-        let mut uv = TextureUv::default();
-        if let Some(of_material) = own_maps(&file, &document, (&pose, needs), &mut warnings)? {
-            let wanted = (needs.color_map && maps.color.is_none(), needs.normal_map && maps.normal.is_none());
-            let (color, mut normal) = document.read_skin_maps(&of_material, wanted, &mut warnings);
-            if normal_flip(&source, &file)? {
-                let texels = normal.iter_mut().flat_map(|map| &mut map.texels);
-                texels.for_each(|texel| texel[1] = 1.0 - texel[1]);
-            }
-            maps.material = Some(of_material.told(color.is_some()));
-            maps.color = maps.color.or(color);
-            maps.normal = maps.normal.or(normal);
-            uv = of_material.uv();
-        }
-        uv = diffusion::atlas_uv(&source, &file.diffusion, (&maps, uv), needs.atlas)?;
+        let of_file = (&source, &file);
+        let material = SkinMaterial::read(of_file, &document, (&pose, needs), &mut maps, &mut warnings)?;
+        let uv = material.as_ref().map(SkinMaterial::uv).unwrap_or_default();
+        let uv = diffusion::atlas_uv(&source, &file.diffusion, (&maps, uv), needs.atlas)?;
         if choices.normal_filter == NormalFilter::Toksvig {
             maps.normalise_normals();
         }
         bar.inc(1);
         let ask = Ask { clip: options.clip, uv, ..ask(&maps, form, effects, needs, &pose) };
-        let mesh = document.mesh(&ask, &mut warnings)?;
+        let mut mesh = document.mesh(&ask, &mut warnings)?;
+        if let Some(material) = material {
+            material.finish(&document, (&mut maps, &mut mesh), &mut warnings);
+        }
         idle_effects(&document, effects, &mesh, &mut warnings)?;
         drop(document);
         bar.inc(1);

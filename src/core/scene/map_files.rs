@@ -59,7 +59,7 @@ pub(super) fn read_maps(
         warn_of_other_than_normals(&path, &normals, warnings);
         normals
     });
-    Ok(Maps { color, normal: normals, specular, attenuator, own, material: None })
+    Ok(Maps { color, normal: normals, specular, attenuator, own, ..Maps::default() })
 }
 
 /// Tells of a normal map that looks like another picture, a photograph say.

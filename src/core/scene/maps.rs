@@ -3,6 +3,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::map_layout::MapLayout;
 use crate::model::fields::Field;
 
 /// An image of `C` linear channels, row by row from the top.
@@ -63,6 +64,9 @@ pub struct Maps {
     /// Where they are looked up as the mesh's own material says: what an engine has to do beside showing its pictures by
     /// the first texture coordinates, if anything.
     pub material: Option<Option<String>>,
+    /// How they are laid out where the material's pictures are mirrored or end: the skin's texture coordinates are moved with
+    /// them.
+    pub layout: Option<MapLayout>,
 }
 
 /// The map of a field.

@@ -55,7 +55,7 @@ fn halved(maps: &Maps) -> Option<Maps> {
         specular: specular.as_ref().and_then(half),
         attenuator: attenuator.as_ref().and_then(half),
         own: own.iter().filter_map(|(field, map)| Some((*field, half_of_own(map)?))).collect(),
-        material: None,
+        ..Maps::default()
     };
     let Maps { color, normal, specular, attenuator, own, .. } = &next;
     let built_in = color.is_some() || normal.is_some() || specular.is_some() || attenuator.is_some();

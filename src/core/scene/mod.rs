@@ -2,7 +2,8 @@
 //!
 //! - [`mesh`]: the mesh as loaded, and posed; [`plain`]: what of it is not skin
 //! - [`view`]: cameras and targets; [`lens`]: what bends their images
-//! - [`maps`]: texture maps and the panorama, and `map_files` that they are read of; [`mip_maps`]: their coarser levels
+//! - [`maps`]: texture maps and the panorama, and `map_files` that they are read of; `skin_material`: those of the mesh file;
+//!   [`map_layout`]: maps beyond their borders; [`mip_maps`]: their coarser levels
 //! - [`light`]: lights beside it, and the irradiance that they bring
 //! - [`load`]: a scene file and everything that it names; its tables are in `file`, their meaning in
 //!   `settings`, `cameras`, `lights` and `dapple`, within the bounds of `numbers`
@@ -44,6 +45,7 @@ pub(crate) mod lit;
 pub mod load;
 mod map_files;
 pub mod map_fit;
+pub mod map_layout;
 pub mod maps;
 pub mod mesh;
 pub mod mip_maps;
@@ -55,6 +57,7 @@ pub mod plain;
 pub mod pose;
 mod settings;
 pub mod shadow_maps;
+mod skin_material;
 pub mod sky_lights;
 pub mod streams;
 mod tangents;

@@ -107,6 +107,18 @@ impl PlainSurface {
     }
 }
 
+impl Alpha {
+    /// The share that is seen where it is this: 0 or 1 but where it blends.
+    #[must_use]
+    pub fn seen(self, alpha: impl FnOnce() -> f32) -> f32 {
+        match self {
+            Self::Opaque => 1.0,
+            Self::Mask(cutoff) => f32::from(u8::from(alpha().clamp(0.0, 1.0) >= cutoff)),
+            Self::Blend => alpha().clamp(0.0, 1.0),
+        }
+    }
+}
+
 impl PlainParts {
     /// The material of a triangle that is not skin.
     #[must_use]
@@ -162,12 +174,7 @@ impl PlainMaterial {
     /// The share of it that is seen at a place of its map, where the mesh has that `tint`: 0 or 1 but where it blends.
     #[must_use]
     pub fn seen(&self, uv: Vec2, tint: [f32; 4]) -> f32 {
-        let alpha = || self.color((uv, tint))[3].clamp(0.0, 1.0);
-        match self.alpha {
-            Alpha::Opaque => 1.0,
-            Alpha::Mask(cutoff) => f32::from(u8::from(alpha() >= cutoff)),
-            Alpha::Blend => alpha(),
-        }
+        self.alpha.seen(|| self.color((uv, tint))[3])
     }
 
     /// What it is at a place of its maps, where the mesh has that `tint`.

@@ -211,6 +211,7 @@ fn refused(error: &MapError, scene: &Path) -> Refused {
         | MapError::Shading(_)
         | MapError::Beside { .. }
         | MapError::Filtered { .. }
+        | MapError::LaidOut { .. }
         | MapError::Unread { .. }
         | MapError::NotUnwrapped { .. } => Refused::Scene(words),
         MapError::Tensor(_) | MapError::TooLarge { .. } | MapError::OutOfMemory { .. } => {

@@ -52,6 +52,9 @@ pub fn layers(
                 if !task.posed.is_unwrapped() {
                     return Err(MapError::NotUnwrapped { map: kind.name() });
                 }
+                if scene.maps.layout.is_some() {
+                    return Err(MapError::LaidOut { map: kind.name() });
+                }
                 let filter = scene.quality.texture_filter;
                 if filter.reads_levels() {
                     return Err(MapError::Filtered { map: kind.name(), filter: filter.name() });

@@ -101,6 +101,16 @@ pub enum MapError {
         /// The filter's name.
         filter: &'static str,
     },
+    /// A texture whose texels stand in several places of another.
+    #[error(
+        "{map} cannot be fitted: the mesh's material mirrors or clamps its pictures where the skin's texture coordinates come to \
+         their borders, for which the maps are laid out anew, some texels more than once. Keep the texture coordinates half a \
+         texel within the pictures, or name maps in [maps], which repeat."
+    )]
+    LaidOut {
+        /// The map's name.
+        map: &'static str,
+    },
     /// A map that no enabled effect reads.
     #[error("no enabled effect reads {map}: it cannot be fitted. Leave it out, or enable {effects}.")]
     Unread {

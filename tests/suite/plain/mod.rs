@@ -6,6 +6,7 @@ mod cutouts;
 mod drawn;
 mod pictures;
 mod shapes;
+pub(crate) mod wrapped;
 
 use std::f64::consts::PI;
 

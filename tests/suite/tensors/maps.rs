@@ -27,6 +27,7 @@ use skinfit::tensor::Input;
 use skinfit::tensor::footprint::{texel_pairs, texels};
 
 use super::bench::{matrix, shared};
+use crate::plain::wrapped::mirrored;
 
 /// Pixels along a side, and texels of the maps: a few samples see each.
 const PIXELS: u32 = 96;
@@ -197,6 +198,20 @@ fn textures_that_samples_see_filtered_are_refused() {
         let occlusion = fit(&filtered(), &filtered(), MapKind::Occlusion, None);
         assert!(occlusion.is_ok(), "{:?}", occlusion.err());
     }
+}
+
+#[test]
+fn textures_that_are_laid_out_anew_are_refused() {
+    if shared().is_none() {
+        return;
+    }
+    let layout = mirrored().maps.layout;
+    let laid_out = || small().with_scene(|scene| scene.maps.layout = layout);
+    let error = fit(&laid_out(), &laid_out(), MapKind::Color, None).err().unwrap();
+    assert!(matches!(error, MapError::LaidOut { map: "color" }), "{error}");
+    // What is no texture is fitted as ever.
+    let occlusion = fit(&laid_out(), &laid_out(), MapKind::Occlusion, None);
+    assert!(occlusion.is_ok(), "{:?}", occlusion.err());
 }
 
 #[test]

@@ -10,7 +10,7 @@
 //! - [`primitive`]: one primitive's attributes and triangles
 //! - [`plain`]: which triangles are skin, and the materials of the others
 //! - [`skins`]: bones and their influences
-//! - [`skin_maps`]: the maps of the skin's own material
+//! - [`skin_maps`]: the maps of the skin's own material; [`skin_unread`]: what else would show of it
 //! - [`places`]: which of the mesh's vertices a primitive's are; [`streams`]: the file with numbers of these added
 //! - [`textures`]: what a material says of a texture
 //! - [`assemble`]: every primitive of the scene in one [`Mesh`](super::mesh::Mesh)
@@ -33,6 +33,7 @@ mod places;
 mod plain;
 mod primitive;
 mod skin_maps;
+mod skin_unread;
 mod skins;
 mod streams;
 mod textures;

@@ -47,7 +47,7 @@ impl Document {
 }
 
 /// Whether it is of triangles: points and lines are left out of the mesh.
-fn is_drawn(primitive: &json::mesh::Primitive) -> bool {
+pub(super) fn is_drawn(primitive: &json::mesh::Primitive) -> bool {
     matches!(primitive.mode, Checked::Valid(Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan))
 }
 

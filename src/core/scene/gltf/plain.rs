@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use gltf::json;
 use json::Index;
-use json::material::AlphaMode;
+use json::material::{AlphaMode, Material};
 use json::mesh::Primitive;
 use json::validation::Checked;
 
@@ -157,7 +157,6 @@ impl Document {
             }
         }
         let [color_map, roughness_map, emission_map] = maps;
-        let sound = |x: f32| if x.is_finite() { x } else { 0.0 };
         let strength = material.extensions.as_ref().and_then(|all| all.emissive_strength.as_ref());
         let strength = strength.map_or(1.0, |strength| sound(strength.emissive_strength.0));
         let plain = PlainMaterial {
@@ -166,19 +165,30 @@ impl Document {
             metallic: sound(surface.metallic_factor.0),
             roughness: sound(surface.roughness_factor.0),
             roughness_map,
-            alpha: match material.alpha_mode {
-                Checked::Valid(AlphaMode::Mask) => {
-                    Alpha::Mask(material.alpha_cutoff.map_or(0.5, |cutoff| sound(cutoff.0)))
-                }
-                Checked::Valid(AlphaMode::Blend) => Alpha::Blend,
-                _ => Alpha::Opaque,
-            },
+            alpha: alpha_of(material).0,
             emission: material.emissive_factor.0.map(|x| sound(strength * sound(x)).max(0.0)),
             emission_map,
             name,
         };
         Ok((plain, uv))
     }
+}
+
+/// What a material's alpha does, and the factor on its picture's.
+pub(super) fn alpha_of(material: &Material) -> (Alpha, f32) {
+    let [.., factor] = material.pbr_metallic_roughness.base_color_factor.0;
+    let alpha = match material.alpha_mode {
+        Checked::Valid(AlphaMode::Mask) => {
+            Alpha::Mask(material.alpha_cutoff.map_or(0.5, |cutoff| sound(cutoff.0)))
+        }
+        Checked::Valid(AlphaMode::Blend) => Alpha::Blend,
+        _ => Alpha::Opaque,
+    };
+    (alpha, sound(factor))
+}
+
+fn sound(x: f32) -> f32 {
+    if x.is_finite() { x } else { 0.0 }
 }
 
 /// What a primitive without a material is drawn by (glTF 2.0, section 3.7.2.1).

@@ -192,7 +192,7 @@ impl Document {
     }
 
     /// Colours of vertices, of three numbers or four.
-    fn colors(&self, index: Index<Accessor>, place: &str) -> Result<Vec<[f32; 4]>, SceneError> {
+    pub(super) fn colors(&self, index: Index<Accessor>, place: &str) -> Result<Vec<[f32; 4]>, SceneError> {
         let kind = self.get(&self.root.accessors, index, "accessor")?.type_;
         let colors: Vec<[f32; 4]> = match kind {
             Checked::Valid(json::accessor::Type::Vec4) => self.floats::<4>(index)?,

@@ -5,21 +5,25 @@ use std::collections::BTreeMap;
 use gltf::json;
 
 use super::document::Document;
+use super::plain::alpha_of;
 use super::textures::{Pictures, TextureUse, TextureUv};
 use crate::scene::error::{SceneError, Warnings, warn};
 use crate::scene::map_files::warn_of_other_than_normals;
+use crate::scene::map_layout::MapLayout;
 use crate::scene::maps::Map;
-use crate::scene::plain::{PlainMap, Wrap};
+use crate::scene::plain::{Alpha, PlainMap, Wrap};
 
 /// What the skin's material says of its maps.
 #[derive(Clone, Debug, PartialEq)]
 pub(in crate::scene) struct SkinMaps {
     /// Its name.
-    material: String,
+    pub(in crate::scene) material: String,
     /// The picture of its base colour, and the factor on it.
     color: Option<(TextureUse, [f32; 3])>,
     /// Its normal map.
     normal: Option<TextureUse>,
+    /// What its alpha does, and the factor on its picture's.
+    alpha: (Alpha, f32),
     /// What it has of these as pictures of formats that are not read.
     unread: Vec<&'static str>,
 }
@@ -38,7 +42,7 @@ impl SkinMaps {
 
     /// What an engine has to do, where the colours are this material's or another's, beside showing the file's pictures by the first texture coordinates; `None` where that
     /// is all.
-    pub(in crate::scene) fn told(&self, colored: bool) -> Option<String> {
+    pub(in crate::scene) fn told(&self, colored: bool, layout: Option<MapLayout>) -> Option<String> {
         let mut words = Vec::new();
         let factor = self.color.filter(|(_, factor)| colored && *factor != [1.0; 3]);
         if let Some((_, [r, g, b])) = factor {
@@ -50,6 +54,13 @@ impl SkinMaps {
         }
         if uv.is_moved() {
             words.push("its KHR_texture_transform moves these".to_owned());
+        }
+        if let Some(layout) = layout {
+            let place = layout.told();
+            words.push(format!(
+                "beyond their borders they are mirrored or end as its samplers say; maps that are written are laid out for that, \
+                 and looked up at {place}"
+            ));
         }
         let name = &self.material;
         (!words.is_empty())
@@ -154,18 +165,19 @@ impl Document {
             material: self.material_name(index),
             color: color.map(|color| (color, [r, g, b].map(sound))),
             normal,
+            alpha: alpha_of(material),
             unread,
         })
     }
 
-    /// The pictures of the skin's material, those that are `wanted`: of its colour, linear, and of its normals. One that
-    /// cannot be read is a warning.
+    /// The pictures of the skin's material, those that are `wanted`: of its colour, linear, and of its normals; each with what
+    /// lies beyond its borders. One that cannot be read is a warning.
     pub(in crate::scene) fn read_skin_maps(
         &self,
         maps: &SkinMaps,
         (color, normal): (bool, bool),
         warnings: &mut Warnings,
-    ) -> (Option<Map<3>>, Option<Map<3>>) {
+    ) -> [Option<(Map<3>, [Wrap; 2])>; 2] {
         let mut pictures = Pictures::default();
         let mut read = |texture: TextureUse, as_color: bool, factor: [f32; 3]| {
             let PlainMap { map, wrap, nearest } = match self.map_of(texture, as_color, &mut pictures) {
@@ -175,21 +187,24 @@ impl Document {
                     return None;
                 }
             };
-            if wrap != [Wrap::Repeat; 2] || nearest {
+            if nearest {
                 let message = format!(
-                    "material {:?}: skin's maps repeat and are filtered, whatever the file's sampler says",
+                    "material {:?}: skin's maps are filtered, though the file's sampler shows texels as squares",
                     maps.material
                 );
                 warn(warnings, &self.path, message);
             }
-            Some(without_alpha(&map, factor))
+            if as_color {
+                self.warn_of_holes(&maps.material, maps.alpha, &map, warnings);
+            }
+            Some((without_alpha(&map, factor), wrap))
         };
         let colors = maps.color.filter(|_| color).and_then(|(texture, factor)| read(texture, true, factor));
         let normals = maps.normal.filter(|_| normal).and_then(|texture| read(texture, false, [1.0; 3]));
-        if let Some(map) = &normals {
+        if let Some((map, _)) = &normals {
             warn_of_other_than_normals(&self.path, map, warnings);
         }
-        (colors, normals)
+        [colors, normals]
     }
 }
 

@@ -100,6 +100,7 @@ fn refusal(error: &MapError, scene: &Path) -> Refusal {
         | MapError::NotUnwrapped { .. } => Some("--maps"),
         MapError::Tensor(_)
         | MapError::Filtered { .. }
+        | MapError::LaidOut { .. }
         | MapError::Length { .. }
         | MapError::NoView { .. }
         | MapError::NotFinite { .. }
@@ -119,6 +120,7 @@ fn refusal(error: &MapError, scene: &Path) -> Refusal {
         | MapError::Beside { .. }
         | MapError::Sharpness { .. }
         | MapError::Filtered { .. }
+        | MapError::LaidOut { .. }
         | MapError::Length { .. }
         | MapError::NoView { .. }
         | MapError::NotUnwrapped { .. } => Refusal::new(words),
