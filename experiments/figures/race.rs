@@ -51,14 +51,22 @@ pub(crate) fn processor(lab: &Lab) -> Result<Value> {
 /// experiments/race: our row of texture-space diffusion on two threads, beside what the other frameworks' program left of
 /// theirs.
 pub(crate) fn diffusion(lab: &Lab) -> Result<Value> {
+    Ok(json!({ "rows": diffused(lab, &["--threads", "2"], "cpu")? }))
+}
+
+/// What the data of texture-space diffusion is called: texels a side, pixels.
+const DIFFUSED: &str = "512_442368";
+
+/// Our row of texture-space diffusion, beside those that the other frameworks left of that device.
+fn diffused(lab: &Lab, options: &[&str], device: &str) -> Result<Vec<Value>> {
     let folder = lab.race.as_ref().ok_or("name the folder of the diffusion race's data by --race")?;
-    let name = "512_442368";
-    let data = folder.join("data").join(name).display().to_string();
+    let data = folder.join("data").join(DIFFUSED).display().to_string();
     let row = lab.scratch.path().join("row.json").display().to_string();
-    let arguments = [data.as_str(), "--diffusion", "--threads", "2", "-o", &row];
-    lab.example("race", &format!("the race of diffusion, {name}"), &arguments)?;
+    let mut arguments = vec![data.as_str(), "--diffusion", "-o", &row];
+    arguments.extend(options);
+    lab.example("race", &format!("the race of diffusion, {DIFFUSED}"), &arguments)?;
     let mut rows: Vec<Value> = vec![serde_json::from_str(&std::fs::read_to_string(&row)?)?];
-    let others = folder.join("results").join(format!("{name}_cpu.json"));
+    let others = folder.join("results").join(format!("{DIFFUSED}_{device}.json"));
     if let Ok(text) = std::fs::read_to_string(others) {
         rows.extend(serde_json::from_str::<Vec<Value>>(&text)?);
     }
@@ -70,7 +78,7 @@ pub(crate) fn diffusion(lab: &Lab) -> Result<Value> {
         }
         shown
     });
-    Ok(json!({ "rows": rows.collect::<Vec<_>>() }))
+    Ok(rows.collect())
 }
 
 /// A framework's row: nanoseconds a pixel of the fastest repetition, milliseconds of its fastest fits.
@@ -106,6 +114,9 @@ pub(crate) fn graphics_card(lab: &Lab) -> Result<Value> {
     let folder = lab.race.as_ref().ok_or("name the folder of the race's data by --race")?;
     let runs = 3;
     let mut raw = json!({ "adapter": card(lab)? });
+    if folder.join("data").join(DIFFUSED).is_dir() {
+        raw["diffusion"] = diffused(lab, &["--engine", "gpu", "--reps", "20"], "cuda")?.into();
+    }
     for (pixels, options) in [
         ("1048576", &["--engine", "gpu", "--reps", "20"][..]),
         ("16777216", &["--engine", "gpu", "--reps", "20", "--passes-only"]),
