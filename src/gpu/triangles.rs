@@ -52,6 +52,12 @@ impl Triangles {
         Self { order, corners, skin: skin as u32, blocking: blocking as u32, plain }
     }
 
+    /// Corners of the others than skin, the first of these being 0: the place of a material, and its corners.
+    pub(super) fn runs(&self) -> impl Iterator<Item = (u16, Range<u32>)> {
+        let corner = |triangle: u32| 3 * (triangle - self.skin);
+        self.plain.iter().map(move |(material, run)| (*material, corner(run.start)..corner(run.end)))
+    }
+
     /// Those that are skin.
     pub(super) fn of_skin(&self) -> &[[u32; 3]] {
         &self.corners[..self.skin as usize]
@@ -88,6 +94,7 @@ mod tests {
         assert_eq!(ordered.corners, [1, 4, 2, 6, 0, 5, 3].map(|i| [i; 3]));
         assert_eq!((ordered.skin, ordered.blocking), (2, 4));
         assert_eq!(ordered.plain, [(1, 2..4), (0, 4..6), (2, 6..7)]);
+        assert_eq!(ordered.runs().collect::<Vec<_>>(), [(1, 0..6), (0, 6..12), (2, 12..15)]);
         let all = Triangles::of(&Mesh { triangles: triangles.clone(), ..Mesh::default() });
         assert_eq!((all.corners, all.skin, all.blocking), (triangles, 7, 7));
         assert!(all.plain.is_empty());

@@ -1,21 +1,23 @@
 //! A scene on the device: what plans read of it, each thing uploaded once and only when a plan names it.
+//!
+//! - `made`: buffers, textures and samplers
+//! - `resource`: what plans read beside attributes
+//! - `pose`: all in another pose
 
-use glam::Mat4;
+mod made;
+mod pose;
+mod resource;
+
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use wgpu::util::{DeviceExt as _, TextureDataOrder};
-use wgpu::{
-    AddressMode, BindingResource, Buffer, BufferUsages, CommandEncoder, Extent3d, FilterMode,
-    MipmapFilterMode, Sampler, SamplerDescriptor, TextureDescriptor, TextureDimension, TextureUsages,
-    TextureView, TextureViewDescriptor,
-};
+use wgpu::{BindingResource, Buffer, BufferUsages, CommandEncoder, Sampler, TextureView};
 
+pub(crate) use self::made::{buffer, storage, texture};
 use super::device::Gpu;
-use super::error::{GpuError, Oversized};
-use super::plain::Materials;
+use super::error::GpuError;
+use super::plain::{Corners, Materials};
 use super::shadow::{self, Mapped};
-use super::texels::{self, Texels};
 use super::timing::Timer;
 use super::triangles::Triangles;
 use super::vertices;
@@ -25,11 +27,9 @@ use crate::bake::{Illumination, PoseBake, SkyBake, VertexOcclusion, VertexThickn
 use crate::model::cube::Cube;
 use crate::model::fields::{Field, Fields};
 use crate::model::params::Params;
-use crate::model::texture_filter::TextureFilter;
 use crate::prepare::Baked;
 use crate::samples::{PosedSurface, SurfaceBakes};
 use crate::scene::Scene;
-use crate::scene::maps::Maps;
 use crate::scene::mesh::Mesh;
 use crate::scene::mip_maps::MipMaps;
 use crate::shader::{Attribute, Facts, Resource};
@@ -83,12 +83,13 @@ pub(super) struct Uploads {
     /// The lights that have shadow maps, and those, once a plan reads them.
     mapped: Vec<Mapped>,
     shadow_maps: Option<shadow::Maps>,
-    /// What is not skin is drawn by, once something draws it.
+    /// What is not skin, and what it is drawn by, once something draws it.
+    corners: Option<Corners>,
     materials: Option<Arc<Materials>>,
     indices: Buffer,
     /// What `indices` holds.
     triangles: Triangles,
-    /// Bytes that were uploaded.
+    /// Bytes that were uploaded, but for the corners' own.
     bytes: u64,
     /// Texels that were cut at the end of their format's range.
     clipped: usize,
@@ -152,6 +153,7 @@ impl Uploads {
             mip_maps: None,
             mapped,
             shadow_maps: None,
+            corners: None,
             materials: None,
             indices,
             triangles,
@@ -194,11 +196,6 @@ impl Uploads {
         &self.indices
     }
 
-    /// The morph targets that are summed, by their index in the mesh.
-    pub(super) fn targets(&self) -> &[usize] {
-        &self.targets
-    }
-
     pub(super) fn vertex_count(&self) -> u64 {
         self.mesh().0.positions.len() as u64
     }
@@ -219,7 +216,11 @@ impl Uploads {
     }
 
     pub(super) const fn bytes(&self) -> u64 {
-        self.bytes
+        let corners = match &self.corners {
+            Some(corners) => corners.bytes(),
+            None => 0,
+        };
+        self.bytes + corners
     }
 
     pub(super) const fn clipped(&self) -> usize {
@@ -279,16 +280,6 @@ impl Uploads {
         Ok(fields.iter().map(|field| (field, surface.field_of_vertices(field))).collect())
     }
 
-    /// A resource, ready to be bound.
-    pub(super) fn resource(&mut self, gpu: &Gpu, resource: Resource) -> Result<Bound, GpuError> {
-        if let Some(bound) = self.resources.get(&resource) {
-            return Ok(bound.clone());
-        }
-        let bound = self.make(gpu, resource)?;
-        self.resources.insert(resource, bound.clone());
-        Ok(bound)
-    }
-
     /// Have the shadow maps that plans of these facts read.
     pub(super) fn make_shadow_maps(&mut self, gpu: &Gpu, facts: &Facts) -> Result<(), GpuError> {
         if self.shadow_maps.is_some() {
@@ -302,6 +293,15 @@ impl Uploads {
         self.resources.extend(maps.bound(gpu));
         self.shadow_maps = Some(maps);
         Ok(())
+    }
+
+    /// The corners of what is not skin.
+    pub(super) fn corners(&mut self, gpu: &Gpu) -> Result<&mut Corners, GpuError> {
+        let corners = match self.corners.take() {
+            Some(corners) => corners,
+            None => Corners::new(gpu, &self.content.scene, &self.triangles, &self.targets)?,
+        };
+        Ok(self.corners.insert(corners))
     }
 
     /// The materials of what is not skin.
@@ -332,209 +332,4 @@ impl Uploads {
     pub(super) fn shadow_maps_drawn(&self) -> u64 {
         self.shadow_maps.as_ref().map_or(0, shadow::Maps::drawn)
     }
-
-    fn make(&mut self, gpu: &Gpu, resource: Resource) -> Result<Bound, GpuError> {
-        let (scene, illumination) = (Arc::clone(&self.content.scene), Arc::clone(&self.content.illumination));
-        let cube = |cube: &Option<Cube<f32>>, form: fn(&Cube<f32>) -> Texels| cube.as_ref().map(form);
-        let stacked = |stack: Stack| &self.stacks[stack as usize];
-        let texels = match resource {
-            Resource::MapSampler => {
-                let filter = scene.quality.texture_filter;
-                return Ok(Bound::Sampler(sampler(gpu, AddressMode::Repeat, filter)));
-            }
-            Resource::CubeSampler => {
-                let filter = TextureFilter::Bilinear;
-                return Ok(Bound::Sampler(sampler(gpu, AddressMode::ClampToEdge, filter)));
-            }
-            Resource::MorphDeltas => {
-                let (mesh, occlusion) = self.mesh();
-                let deltas = vertices::morph_deltas(mesh, &self.targets, occlusion);
-                return self.storage(gpu, "morph targets", &deltas);
-            }
-            Resource::Bones => return self.storage(gpu, "bones", &vertices::bones(&scene.mesh.bones)),
-            Resource::IrradianceFaces => cube(&illumination.irradiance, texels::faces),
-            Resource::SpecularFaces => cube(stacked(Stack::Specular), texels::faces),
-            Resource::ReflectedFaces => cube(stacked(Stack::Reflected), texels::faces),
-            Resource::GlossyFaces => cube(stacked(Stack::Glossy), texels::faces),
-            // A fit's: no renderer's plan reads them. Shadow maps are there before they are asked for.
-            Resource::SpecularSlopeFaces
-            | Resource::ReflectedSlopeFaces
-            | Resource::GlossySlopeFaces
-            | Resource::ShadowMaps
-            | Resource::ShadowSampler
-            | Resource::ShadowViews => None,
-            Resource::HiliteFaces => cube(&illumination.hilite, texels::faces),
-            Resource::IrradianceCube => cube(&illumination.irradiance, texels::cube),
-            Resource::SpecularCube => cube(stacked(Stack::Specular), texels::cube),
-            Resource::ReflectedCube => cube(stacked(Stack::Reflected), texels::cube),
-            Resource::GlossyCube => cube(stacked(Stack::Glossy), texels::cube),
-            Resource::HiliteCube => cube(&illumination.hilite, texels::cube),
-            map => texels::map(map, &scene.maps, self.coarser_maps(&scene)),
-        };
-        let texels = texels.ok_or_else(|| GpuError::Refused {
-            adapter: gpu.name().to_owned(),
-            reason: format!("the shader reads {}, which the scene does not have", resource.name()),
-        })?;
-        self.bytes += texels.bytes.len() as u64;
-        self.clipped += texels.clipped;
-        Ok(Bound::Texture(texture(gpu, resource.name(), &texels)?))
-    }
-
-    /// The levels of the scene's maps below the finest; none where its filter reads none.
-    fn coarser_maps(&mut self, scene: &Scene) -> &[Maps] {
-        if self.mip_maps.is_none() {
-            self.mip_maps = MipMaps::new(&scene.maps, scene.quality.texture_filter);
-        }
-        self.mip_maps.as_ref().map_or(&[], MipMaps::levels)
-    }
-
-    fn storage(&mut self, gpu: &Gpu, what: &str, rows: &[[f32; 4]]) -> Result<Bound, GpuError> {
-        let made = storage(gpu, what, bytemuck::cast_slice(rows))?;
-        self.bytes += made.size();
-        Ok(Bound::Buffer(made))
-    }
-
-    /// The whole mesh in a pose of those bones and weights, where what is on the device goes by more than these: shadows,
-    /// what is found at vertices and what reaches parts that are not skin are of the posed surface, which the processor knows of the whole mesh.
-    pub(super) fn posed_whole(&self, bones: &[Mat4], weights: &[f32]) -> Option<Mesh> {
-        let mesh = &self.content.scene.mesh;
-        let finds = self.attributes.keys().any(|attribute| matches!(attribute, Attribute::Field(_)));
-        if self.shadow_maps.is_none() && !finds && mesh.plain.is_none() {
-            return None;
-        }
-        let mut mesh = Mesh { bones: self.posed(bones), ..mesh.clone() };
-        mesh.morphs.iter_mut().zip(weights).for_each(|(morph, weight)| morph.weight = *weight);
-        Some(mesh)
-    }
-
-    /// Put other bones in place of those that are on the device.
-    pub(super) fn set_pose(&self, gpu: &Gpu, bones: &[Mat4]) {
-        if let Some(Bound::Buffer(buffer)) = self.resources.get(&Resource::Bones) {
-            let rows = vertices::bones(&self.posed(bones));
-            gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&rows));
-        }
-    }
-
-    /// The mesh's bones, those that are given in the place of its own.
-    fn posed(&self, bones: &[Mat4]) -> Vec<Mat4> {
-        let mut posed = self.content.scene.mesh.bones.clone();
-        posed.iter_mut().zip(bones).for_each(|(old, new)| *old = *new);
-        posed
-    }
-
-    /// Put another pose of the mesh (the same vertices at another time) in place of the one that is on the
-    /// device; and what is baked of that pose, where it has bakes of its own, in place of the scene's.
-    pub(super) fn set_mesh(
-        &mut self,
-        gpu: &Gpu,
-        mesh: &Mesh,
-        own: Option<&PoseBake>,
-    ) -> Result<(), GpuError> {
-        if let Some(maps) = &mut self.shadow_maps {
-            maps.set_mesh(gpu, mesh);
-        }
-        let occlusion = own.and_then(|own| own.occlusion.as_ref());
-        let occluded = occlusion.is_some();
-        let occlusion = occlusion.or(self.content.occlusion.as_deref());
-        // What is found at vertices is found anew in this pose.
-        let finds = self.attributes.keys().filter_map(|attribute| match attribute {
-            Attribute::Field(field) => Some(*field),
-            _ => None,
-        });
-        let fields = self.fields(gpu, mesh, own, Fields::of(finds))?;
-        for (&attribute, buffer) in &self.attributes {
-            let moves = matches!(
-                attribute,
-                Attribute::Position | Attribute::Normal | Attribute::Tangent | Attribute::Field(_)
-            );
-            if moves || occluded && attribute == Attribute::Occlusion {
-                let bytes = vertices::attribute(attribute, mesh, occlusion, &fields);
-                gpu.queue.write_buffer(buffer, 0, &bytes);
-            }
-        }
-        for (&resource, bound) in &self.resources {
-            let rows = match resource {
-                Resource::Bones => vertices::bones(&mesh.bones),
-                Resource::MorphDeltas => vertices::morph_deltas(mesh, &self.targets, occlusion),
-                _ => continue,
-            };
-            if let Bound::Buffer(buffer) = bound {
-                gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&rows));
-            }
-        }
-        Ok(())
-    }
-}
-
-fn check_size(gpu: &Gpu, what: &str, bytes: u64, limit: u64) -> Result<(), GpuError> {
-    if bytes <= limit {
-        return Ok(());
-    }
-    let (adapter, what) = (gpu.name().to_owned(), what.to_owned());
-    Err(GpuError::BufferSize { adapter, what, bytes, limit, of: Oversized::Mesh })
-}
-
-pub(super) fn buffer(
-    gpu: &Gpu,
-    label: &str,
-    contents: &[u8],
-    usage: BufferUsages,
-) -> Result<Buffer, GpuError> {
-    check_size(gpu, label, contents.len() as u64, gpu.device.limits().max_buffer_size)?;
-    let made = gpu.buffer(label, contents, usage);
-    gpu.check()?;
-    Ok(made)
-}
-
-/// A buffer that shaders read.
-pub(super) fn storage(gpu: &Gpu, what: &str, bytes: &[u8]) -> Result<Buffer, GpuError> {
-    check_size(gpu, what, bytes.len() as u64, gpu.device.limits().max_storage_buffer_binding_size)?;
-    buffer(gpu, what, bytes, BufferUsages::STORAGE)
-}
-
-pub(crate) fn texture(gpu: &Gpu, name: &str, texels: &Texels) -> Result<TextureView, GpuError> {
-    let limit = gpu.device.limits().max_texture_dimension_2d;
-    if texels.width.max(texels.height) > limit {
-        return Err(GpuError::TextureSize {
-            adapter: gpu.name().to_owned(),
-            what: name.replace('_', " "),
-            width: texels.width as usize,
-            height: texels.height as usize,
-            limit,
-            of: Oversized::Map,
-        });
-    }
-    let descriptor = TextureDescriptor {
-        label: Some(name),
-        size: Extent3d { width: texels.width, height: texels.height, depth_or_array_layers: texels.layers },
-        mip_level_count: texels.levels,
-        sample_count: 1,
-        dimension: TextureDimension::D2,
-        format: texels.format,
-        usage: TextureUsages::TEXTURE_BINDING,
-        view_formats: &[],
-    };
-    let order = TextureDataOrder::LayerMajor;
-    let made = gpu.device.create_texture_with_data(&gpu.queue, &descriptor, order, &texels.bytes);
-    gpu.check()?;
-    Ok(made.create_view(&TextureViewDescriptor {
-        dimension: Some(texels.dimension),
-        ..TextureViewDescriptor::default()
-    }))
-}
-
-/// Bilinear within a level, and as `filter` says between levels, where a texture has several. An adapter that cannot
-/// filter anisotropically looks up once.
-fn sampler(gpu: &Gpu, mode: AddressMode, filter: TextureFilter) -> Sampler {
-    let between = if filter.reads_levels() { MipmapFilterMode::Linear } else { MipmapFilterMode::Nearest };
-    gpu.device.create_sampler(&SamplerDescriptor {
-        address_mode_u: mode,
-        address_mode_v: mode,
-        address_mode_w: mode,
-        mag_filter: FilterMode::Linear,
-        min_filter: FilterMode::Linear,
-        mipmap_filter: between,
-        anisotropy_clamp: filter.most_taps(),
-        ..SamplerDescriptor::default()
-    })
 }

@@ -17,11 +17,10 @@ use crate::constants;
 use crate::device::Gpu;
 use crate::error::GpuError;
 use crate::pipeline::nearest;
-use crate::scene::mesh::Mesh;
 use crate::shader::Facts;
 use crate::upload::Uploads;
 
-/// Those parts on a device, ready to be drawn into the layers of shadow maps.
+/// Those parts on a device, ready to be drawn into the layers of shadow maps, in the pose that their corners are in.
 pub(crate) struct Casters {
     placed: Placed,
     materials: Arc<Materials>,
@@ -44,26 +43,18 @@ impl Casters {
         layers: usize,
     ) -> Result<Option<Self>, GpuError> {
         let triangles = uploads.triangles();
-        let (first, end) = (triangles.blocking, triangles.corners.len() as u32);
-        if first == end || layers == 0 {
+        let first = 3 * (triangles.blocking - triangles.skin);
+        let runs: Vec<_> = triangles.runs().filter(|(_, corners)| corners.start >= first).collect();
+        if runs.is_empty() || layers == 0 {
             return Ok(None);
         }
-        let open = triangles.plain.iter().filter(|(_, triangles)| triangles.start >= first);
-        let corners = |triangles: &Range<u32>| 3 * (triangles.start - first)..3 * (triangles.end - first);
-        let runs = open.map(|(material, triangles)| (*material, corners(triangles))).collect();
         let plan = casting(facts).map_err(|error| GpuError::Plan(error.to_string()))?;
-        let placed = Placed::new(gpu, plan, first..end, uploads)?;
+        let placed = Placed::new(gpu, plan, uploads.corners(gpu)?)?;
         let materials = uploads.materials(gpu)?;
         let pipeline = pipeline(gpu, &placed, &materials);
         let layers = (0..layers).map(|_| placed.constants(gpu)).collect();
-        uploads.add_bytes(placed.bytes());
         gpu.check()?;
         Ok(Some(Self { placed, materials, runs, pipeline, layers }))
-    }
-
-    /// Put another pose of the mesh in the place of the one that is on the device.
-    pub(crate) fn set_mesh(&self, gpu: &Gpu, mesh: &Mesh) {
-        self.placed.set_mesh(gpu, mesh);
     }
 
     /// Draw them into a layer that shows the world by that matrix.

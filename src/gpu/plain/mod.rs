@@ -2,7 +2,7 @@
 //!
 //! - [`Plain`]: the parts on the device, and the passes' draws
 //! - `text`: the text of their shaders
-//! - `placed`: where their corners are
+//! - [`Corners`]: their corners, and `placed`: what places these
 //! - `light`: what reaches them; the lights and the sky
 //! - `materials`: what each part is drawn by
 //! - [`Casters`]: those that have holes or blend, in shadow maps
@@ -10,6 +10,7 @@
 //! No constant of the skin moves them. Where lights move or the environment turns, the renderer makes them anew.
 
 mod casters;
+mod corners;
 mod light;
 mod materials;
 mod placed;
@@ -25,6 +26,7 @@ use wgpu::{
 };
 
 pub(super) use self::casters::Casters;
+pub(super) use self::corners::Corners;
 use self::light::Light;
 pub(super) use self::materials::Materials;
 use self::placed::{Placed, layouts};
@@ -68,17 +70,13 @@ impl Plain {
         if ordered.plain.is_empty() {
             return Ok(None);
         }
-        let (first, end) = (ordered.skin, ordered.corners.len() as u32);
-        let corners = |triangles: &Range<u32>| 3 * (triangles.start - first)..3 * (triangles.end - first);
-        let runs =
-            ordered.plain.iter().map(|(material, triangles)| (*material, corners(triangles))).collect();
-        let light =
-            Light::new(gpu, &scene, &uploads.content().params, ordered.order[first as usize..].to_vec())?;
+        let (runs, order) = (ordered.runs().collect(), ordered.order[ordered.skin as usize..].to_vec());
+        let light = Light::new(gpu, &scene, &uploads.content().params, order)?;
         let plan = placing(facts).map_err(|error| GpuError::Plan(error.to_string()))?;
-        let placed = Placed::new(gpu, plan, first..end, uploads)?;
+        let placed = Placed::new(gpu, plan, uploads.corners(gpu)?)?;
         let materials = uploads.materials(gpu)?;
         let layouts = [placed.inputs.layout.clone(), materials.layout().clone(), light.layout().clone()];
-        uploads.add_bytes(placed.bytes() + light.bytes());
+        uploads.add_bytes(light.bytes());
         gpu.check()?;
         Ok(Some(Self { placed, light, materials, runs, layouts }))
     }
@@ -136,9 +134,8 @@ impl Plain {
         self.light.set(gpu, axis);
     }
 
-    /// Put another pose of the mesh, and what reaches it there, in the place of those that are on the device.
+    /// Put what reaches another pose of the mesh, whose corners `uploads` have, in the place of what is on the device.
     pub(super) fn set_mesh(&self, gpu: &Gpu, uploads: &Uploads, mesh: &Mesh) {
-        self.placed.set_mesh(gpu, mesh);
         self.light.set_mesh(gpu, &uploads.content().scene, mesh);
     }
 

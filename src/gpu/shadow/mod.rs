@@ -147,9 +147,6 @@ impl Maps {
 
     /// Fit the maps to a pose of the mesh. They are drawn with the next frame.
     pub(super) fn set_mesh(&mut self, gpu: &Gpu, mesh: &Mesh) {
-        if let Some(casters) = &self.casters {
-            casters.set_mesh(gpu, mesh);
-        }
         let places = mesh.pose().positions;
         let mut rows = Vec::with_capacity(ROWS * self.layers.len());
         let views = self.lights.iter().flat_map(|light| views(light, &self.settings, &places));

@@ -14,7 +14,7 @@ use skinfit::scene::mesh::PosedMesh;
 
 use super::{SCENE, edited};
 use crate::graphics::bench::{EXACT, cache, gpu, on_cpu, on_gpu};
-use crate::scene_folder::encode;
+use crate::scene_folder::{SceneFolder, encode};
 
 /// Rays a vertex.
 const RAYS: u32 = 256;
@@ -22,7 +22,7 @@ const RAYS: u32 = 256;
 const MANY: u32 = 16_384;
 
 /// What a texel has of alpha, by its column and row.
-type Alpha = fn(u32, u32) -> u8;
+pub(super) type Alpha = fn(u32, u32) -> u8;
 
 /// A white picture whose alpha is that, 16 texels a side.
 fn picture(alpha: impl Fn(u32, u32) -> u8) -> Vec<u8> {
@@ -31,12 +31,12 @@ fn picture(alpha: impl Fn(u32, u32) -> u8) -> Vec<u8> {
 }
 
 /// Opaque on the left, clear on the right.
-fn halves(x: u32, _: u32) -> u8 {
+pub(super) fn halves(x: u32, _: u32) -> u8 {
     if x < 8 { 255 } else { 0 }
 }
 
 /// A material of that mode with the picture.
-fn card(mode: &str) -> Value {
+pub(super) fn card(mode: &str) -> Value {
     json!({"name": "Card", "alphaMode": mode, "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}})
 }
 
@@ -197,8 +197,23 @@ fn skin_is_as_thick_as_if_cards_below_it_were_not_there() {
     }
 }
 
-/// The picture of a lit scene, whose card is half as wide as the skin and shades its right.
+/// A lit scene, whose card is half as wide as the skin and shades its right.
 fn lit(material: &Value, alpha: impl Fn(u32, u32) -> u8, edit: impl FnOnce(&mut Value)) -> Baked {
+    at(&lit_folder(material, alpha, |mesh, _| edit(mesh)), None)
+}
+
+/// The scene in a folder, at those seconds of its animation.
+pub(super) fn at(folder: &SceneFolder, time: Option<f64>) -> Baked {
+    let options = PrepareOptions { cache: Some(cache()), time, ..PrepareOptions::default() };
+    Baked::new(&folder.path("scene.toml"), &options).unwrap()
+}
+
+/// The folder of that scene.
+pub(super) fn lit_folder(
+    material: &Value,
+    alpha: impl Fn(u32, u32) -> u8,
+    edit: impl FnOnce(&mut Value, &mut Vec<u8>),
+) -> SceneFolder {
     let lamp = "[[light]]\nname = \"cut_aside\"\ntype = \"directional\"\ndirection = [1, 0, -0.7]\nirradiance = [3.0, 3.0, 3.0]\n";
     let side = |key: &str| (format!("{key} = 16"), format!("{key} = {}", 16 * FINER));
     let [(wide, wider), (high, higher)] = ["width", "height"].map(side);
@@ -207,10 +222,9 @@ fn lit(material: &Value, alpha: impl Fn(u32, u32) -> u8, edit: impl FnOnce(&mut 
         .replace(&high, &higher)
         .replace("\"diffuse\"", "\"lights\", \"shadows\"")
         .replace("[environment]\nfile = \"env.exr\"\n", lamp);
-    let folder = edited(material, &scene, |mesh, _| edit(mesh));
+    let folder = edited(material, &scene, edit);
     folder.write("picture.png", &picture(alpha));
-    let options = PrepareOptions { cache: Some(cache()), ..PrepareOptions::default() };
-    Baked::new(&folder.path("scene.toml"), &options).unwrap()
+    folder
 }
 
 /// Pixels a side of each of the picture's 16 squares a side.
@@ -218,7 +232,7 @@ const FINER: usize = 4;
 
 /// How bright the skin is in column 14 of rows 5 to 10 of squares, which the card's right half shades, beside column 1, its
 /// mirror image, which nothing does.
-fn beside_the_open(image: &Image) -> f32 {
+pub(super) fn beside_the_open(image: &Image) -> f32 {
     let column = |at: usize| FINER * at..FINER * (at + 1);
     let row = |y: usize, at: usize| column(at).map(|x| image.rgb[image.width * y + x][0]).sum::<f32>();
     let sum = |at: usize| (5 * FINER..11 * FINER).map(|y| row(y, at)).sum::<f32>();
@@ -226,7 +240,7 @@ fn beside_the_open(image: &Image) -> f32 {
 }
 
 /// By rays, of which each pixel has 64, and by the renderer's shadow maps, where there is an adapter.
-fn traced_and_drawn(baked: &Baked) -> [Option<f32>; 2] {
+pub(super) fn traced_and_drawn(baked: &Baked) -> [Option<f32>; 2] {
     let drawn = gpu().map(|gpu| beside_the_open(&on_gpu(gpu, baked, EXACT)));
     [Some(beside_the_open(&on_cpu(baked, 8))), drawn]
 }

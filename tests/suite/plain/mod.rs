@@ -5,6 +5,7 @@
 mod cutouts;
 mod drawn;
 mod pictures;
+mod posed;
 mod shapes;
 pub(crate) mod wrapped;
 
