@@ -12,6 +12,7 @@
 mod accuracy;
 mod animation;
 mod builds;
+mod clip;
 mod closeup;
 mod diffusion;
 mod flicker;
@@ -31,6 +32,7 @@ mod strays;
 mod studies;
 mod suggested;
 mod timings;
+mod transfer;
 mod unchanged;
 mod ways;
 mod window;
