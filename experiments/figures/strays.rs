@@ -75,17 +75,20 @@ fn measured(word: &str, next: &str) -> bool {
     is_number && (unit(behind) || (behind.is_empty() && unit(next)))
 }
 
-/// Numbers that "times as" and the like stand behind.
+/// Numbers that "times as", "thirds" and the like stand behind.
 const COUNTS: [&str; 12] =
     ["two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "twenty", "forty", "hundred"];
 
-/// Whether words begin one of the usual measures: "three times as", "ten times faster", "twice as", "half the time", "a tenth".
+/// Whether words begin one of the usual measures: "three times as", "ten times faster", "twice as", "half the time", "half of",
+/// "a third", "two thirds".
 fn measured_in_words(words: [&str; 3]) -> bool {
     let words =
         words.map(|word| word.trim_matches(|c: char| !c.is_alphanumeric() && c != '-').to_lowercase());
     match words.each_ref().map(String::as_str) {
         [count, "times", "as" | "faster" | "slower" | "less" | "more"] => COUNTS.contains(&count),
-        ["twice" | "half", "as", _] | ["half", "the", "time" | "cost"] | ["a", "tenth", _] => true,
+        [count, "thirds" | "quarters", _] => COUNTS.contains(&count),
+        ["twice" | "half", "as", _] | ["half", "of", _] | ["half", "the", "time" | "cost"] => true,
+        ["a", "third" | "quarter" | "tenth", _] => true,
         _ => false,
     }
 }
@@ -128,8 +131,16 @@ pub(crate) const DEFINITIONS: &[(&str, &str, &str)] = &[
     ("docs/building.md", "half as many again", "a third beside two"),
     ("docs/gpu-engine.md", "half as much is tried", "a rule of the program"),
     ("docs/panorama.md", "more than a tenth is clipped", "a rule of the program"),
-    ("docs/results.md", "three times as wide", "of the scenes' cameras"),
-    ("docs/studies.md", "eight times as long", "what is varied"),
+    ("docs/python.md", "beside it in a third", "the number of a virtual environment"),
+    ("docs/rendering.md", "a third of the maps' memory again", "1/4 + 1/16 + 1/64 + ..."),
+    (
+        "docs/results.md",
+        "from a quarter of the way between shadow and light to three quarters",
+        "what is measured",
+    ),
+    ("docs/shaders.md", "counts a quarter of a fragment", "a default of the program"),
+    ("docs/studies.md", "from eight times as long to a quarter", "what is varied"),
+    ("experiments/accuracy_vs_time/README.md", "a quarter of the pixels gives", "what is varied"),
     ("experiments/ablation/README.md", "less than a tenth of the loss", "what the list is of"),
     ("experiments/race/README.md", "of which half as many numbers", "what was changed"),
 ];
@@ -156,6 +167,11 @@ mod tests {
             "it is twice as fast",
             "(half the time)",
             "by a tenth",
+            "within a\nthird of it",
+            "about two thirds,",
+            "up to a quarter.",
+            "less than half of that",
+            "half as much",
         ] {
             assert_eq!(found(text), 1, "{text}");
         }
@@ -167,7 +183,7 @@ mod tests {
             "| 8 | seconds of baking |",
             "<!-- figures: page.json#a | {x} | -->\n| a |\n| --- |\n| 0.5 |\n<!-- end -->",
             "| 3 | of 4 passes |",
-            "[5](page.json#a) times as fast, two times, half of it, half the texels, a tenth-order term",
+            "[5](page.json#a) times as fast, two times, half the texels, a tenth-order term, the third of four",
             "to 10⁻⁶, by burn 0.22.1, as in figure 3.",
         ] {
             assert_eq!(found(text), 0, "{text}");

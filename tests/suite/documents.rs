@@ -121,6 +121,20 @@ fn every_raw_file_says_how_it_came_about() {
 }
 
 #[test]
+fn the_table_of_raw_files_has_every_one_that_is_measured() {
+    let [page, program] = ["README.md", "main.rs"]
+        .map(|name| std::fs::read_to_string(root().join("experiments/figures").join(name)).unwrap());
+    let files = program.split_once("const FILES: ").and_then(|(_, rest)| rest.split_once("];"));
+    let files: Vec<&str> = files.unwrap().0.split('"').skip(1).step_by(2).collect();
+    assert!(files.len() > 20, "{files:?}");
+    let rows: Vec<&str> = page.lines().filter(|line| line.starts_with("| `")).collect();
+    for file in files {
+        let named = rows.iter().any(|row| row.contains(&format!("`{file}`")));
+        assert!(named, "experiments/figures/README.md has no row for {file}");
+    }
+}
+
+#[test]
 fn no_page_has_a_figure_that_no_raw_file_gives() {
     let mut found = Vec::new();
     for page in pages_of_the_project() {

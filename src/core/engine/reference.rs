@@ -99,30 +99,23 @@ impl<'a> Reference<'a> {
     /// Value and columns of one pixel slot of a view: the means over its samples.
     #[must_use]
     pub fn pixel(&self, view: usize, slot: usize, params: &Params) -> PixelColumns {
-        self.pixel_under(view, slot, params, &self.cubes(params))
-    }
-
-    /// The same under cubes of the caller's, which may be rounded.
-    #[must_use]
-    pub fn pixel_under(
-        &self,
-        view: usize,
-        slot: usize,
-        params: &Params,
-        cubes: &CubesAt<f64>,
-    ) -> PixelColumns {
-        let setting = self.steps.setting(params, cubes, 0.0);
-        let group =
-            self.group(&self.at(view, &setting, (params, cubes)), slot / LANES, &mut Registers::default());
-        group[slot % LANES].clone()
+        let cubes = self.cubes(params);
+        let setting = self.steps.setting(params, &cubes, 0.0);
+        let at = self.at(view, &setting, (params, &cubes));
+        self.group(&at, slot / LANES, &mut Registers::default())[slot % LANES].clone()
     }
 
     /// Value and columns of every pixel slot of a view, those of padding among them. All cores.
     #[must_use]
     pub fn pixels(&self, view: usize, params: &Params) -> Vec<PixelColumns> {
-        let cubes = self.cubes(params);
-        let setting = self.steps.setting(params, &cubes, 0.0);
-        let at = self.at(view, &setting, (params, &cubes));
+        self.pixels_under(view, params, &self.cubes(params))
+    }
+
+    /// The same under cubes of the caller's, which may be rounded.
+    #[must_use]
+    pub fn pixels_under(&self, view: usize, params: &Params, cubes: &CubesAt<f64>) -> Vec<PixelColumns> {
+        let setting = self.steps.setting(params, cubes, 0.0);
+        let at = self.at(view, &setting, (params, cubes));
         let group = |registers: &mut Registers<f64>, group| self.group(&at, group, registers);
         (0..at.view.samples.groups())
             .into_par_iter()

@@ -1,5 +1,5 @@
-//! What the search of lights draws: fragments with the fields that samples hold of lights and sky, named choices, and
-//! parameters.
+//! What engines alone are given: fragments with the fields that samples hold of lights, of the sky and of effects that files
+//! declare. The search of lights draws them, with named choices and parameters.
 
 use std::sync::Arc;
 
@@ -21,13 +21,13 @@ use crate::model::choices::{
 use crate::model::cube::Cube;
 use crate::model::effects::{Effect, Effects, Form, Prerequisite, Silhouette};
 use crate::model::evaluate::Setup;
-use crate::model::fields::Field;
+use crate::model::fields::Fields;
 use crate::model::fragment::Fragment;
 use crate::model::params::{Param, Params};
 use crate::model::transmission::FARTHEST;
 use crate::model::vector::dot;
-use crate::samples::surface_records::Asked;
-use crate::samples::{LANES, SurfaceRecords};
+use crate::samples::surface_records::{Asked, Unmade};
+use crate::samples::{Atlas, LANES, SurfaceRecords};
 use crate::scene::light::{Beam, Cone, Lamp};
 use crate::scene::{Light, LightKind as SceneLight, Loss};
 use crate::shader::term::{TermError, library};
@@ -64,9 +64,24 @@ pub(super) struct LitFragment {
     /// What samples hold of it.
     held: Fragment<f32>,
     fields: Vec<[f32; 3]>,
+    /// Texture coordinates and chart, where it looks texels of the UV atlas up.
+    place: [f32; 3],
+}
+
+impl LitFragment {
+    /// A fragment under the switches of `setup`.
+    pub(super) fn new(setup: Setup, inputs: FragmentInputs, fields: Vec<[f32; 3]>, place: [f32; 3]) -> Self {
+        Self { inputs, held: inputs.fragment(setup, 0.0), fields, place }
+    }
+
+    /// Another surface with what samples hold beside it.
+    pub(super) fn with_surface(&self, setup: Setup, inputs: FragmentInputs) -> Self {
+        Self::new(setup, inputs, self.fields.clone(), self.place)
+    }
 }
 
 /// Fragments under one setting.
+#[derive(Clone)]
 pub(super) struct LitBatch {
     /// The switches of the model.
     pub(super) setup: Setup,
@@ -76,8 +91,21 @@ pub(super) struct LitBatch {
     pub(super) light: Arc<Illumination>,
     /// What engines minimise.
     pub(super) loss: Loss,
+    /// What engines move: the parameters whose derivatives must be finite.
+    pub(super) free: Vec<Param>,
+    /// Those of them whose derivatives must be as near to f64 as the colours.
+    pub(super) compared: Vec<Param>,
+    /// What fragments hold beside their surface.
+    pub(super) fields: Fields,
+    /// The texels that they look up.
+    pub(super) atlas: Option<Arc<Atlas>>,
     /// The fragments.
     pub(super) fragments: Vec<LitFragment>,
+}
+
+/// Every parameter that a fit may move.
+fn movable(effects: Effects) -> Vec<Param> {
+    Param::all().filter(|param| !param.info().held && param.asked_for(effects)).collect()
 }
 
 impl LitBatch {
@@ -92,21 +120,35 @@ impl LitBatch {
             params.set_rgb(param, rgb);
         }
         let light = light(lights, setup.choices.specular_model, rng);
-        let fields: Vec<Field> = setup.needs().fields.iter().collect();
+        let fields = setup.needs().fields;
         let draw = |rng: &mut StdRng| {
             let inputs = fragment(rng);
             let fields = fields.iter().map(|field| found(field.name(), &inputs, rng)).collect();
-            LitFragment { inputs, held: inputs.fragment(setup, 0.0), fields }
+            LitFragment::new(setup, inputs, fields, [0.0; 3])
         };
         let fragments = (0..count).map(|_| draw(rng)).collect();
-        Self { setup, params, light, loss: one_of(rng, &Loss::ALL), fragments }
+        Self { loss: one_of(rng, &Loss::ALL), fragments, ..Self::bare(setup, params, light) }
+    }
+
+    /// No fragment yet.
+    fn bare(setup: Setup, params: Params, light: Arc<Illumination>) -> Self {
+        Self {
+            setup,
+            params,
+            light,
+            loss: Loss::L2,
+            free: movable(setup.effects),
+            compared: Vec::new(),
+            fields: setup.needs().fields,
+            atlas: None,
+            fragments: Vec::new(),
+        }
     }
 
     /// One of its fragments alone.
     #[must_use]
     pub(super) fn alone(&self, slot: usize) -> Self {
-        let (params, light) = (self.params.clone(), Arc::clone(&self.light));
-        Self { params, light, fragments: vec![self.fragments[slot].clone()], ..*self }
+        Self { fragments: vec![self.fragments[slot].clone()], ..self.clone() }
     }
 
     /// Its switches in words.
@@ -126,9 +168,13 @@ impl LitBatch {
                 *vector = moves.vector(*vector);
             }
             let fields = fragment.fields.iter().map(|numbers| moves.vector(*numbers)).collect();
-            LitFragment { inputs, held, fields }
+            LitFragment { inputs, held, fields, ..*fragment }
         };
         let fragments = self.fragments.iter().map(|fragment| each(fragment, moves)).collect();
+        if self.atlas.is_some() {
+            // Each move of a parameter would make every level anew, to change it less than sums of texels round.
+            return (fragments, self.params.clone());
+        }
         let mut params = moved_params(&self.params, moves);
         for param in Param::all().filter(|param| !param.is_built_in() && param.asked_for(self.setup.effects))
         {
@@ -146,8 +192,8 @@ impl LitBatch {
         fragments: &[LitFragment],
         groups: usize,
     ) -> (SurfaceRecords, Vec<u32>, Vec<f32>) {
-        let fields = self.setup.needs().fields;
-        let mut surface = SurfaceRecords::new(Asked { fields, ..Asked::EVERYTHING }, groups);
+        let (fields, uv) = (self.fields, self.atlas.is_some());
+        let mut surface = SurfaceRecords::new(Asked { fields, uv, ..Asked::EVERYTHING }, groups);
         let of_slot = |slot: usize| match fragments.get(slot) {
             Some(fragment) => (fragment, slot as u32, 1.0),
             None => (&fragments[slot / LANES * LANES], u32::MAX, 0.0),
@@ -155,7 +201,8 @@ impl LitBatch {
         let (mut pixel, mut coverage) = (Vec::new(), Vec::new());
         for slot in 0..groups * LANES {
             let (fragment, number, share) = of_slot(slot);
-            surface.set(slot, &fragment.held, share);
+            let [u, v, chart] = fragment.place;
+            surface.set_all(slot, &(fragment.held, Unmade { uv: [u, v], chart, ..Unmade::default() }), share);
             pixel.push(number);
             coverage.push(share);
         }
@@ -219,7 +266,8 @@ fn alone() -> impl Iterator<Item = Effect> {
 /// Products of four of these, squared, stay below f32's 3.4e38.
 const BRIGHTEST: f64 = 100.0;
 
-fn number(param: Param, form: Form, rng: &mut StdRng) -> f64 {
+/// As the search draws it.
+pub(super) fn number(param: Param, form: Form, rng: &mut StdRng) -> f64 {
     parameter(param, form, rng).clamp(-BRIGHTEST, BRIGHTEST.max(param.info().corrected))
 }
 
@@ -350,10 +398,10 @@ impl LitBatch {
         let light = if case.sky == Sky::Constant { constant(own, model) } else { mirrored(own, model) };
         let shaded = |place: &Place| {
             let fields = setup.needs().fields.iter().map(|field| place.field(field.name())).collect();
-            LitFragment { inputs: place.surface, held: place.surface.fragment(setup, 0.0), fields }
+            LitFragment::new(setup, place.surface, fields, [0.0; 3])
         };
         let fragments = case.places.iter().map(shaded).collect();
-        Ok(Self { setup, params, light: Arc::new(light), loss: Loss::L2, fragments })
+        Ok(Self { fragments, ..Self::bare(setup, params, Arc::new(light)) })
     }
 }
 
@@ -369,10 +417,10 @@ impl LitBatch {
         let effects = probes.0.iter().chain(specular).fold(EVERYTHING.with(Effect::Lights), Effects::with);
         let setup = Setup::new(Form::Corrected, Silhouette::Bumped, effects.without(Effect::KeyLight));
         let setup = Setup { choices: Choices { specular_model: model, ..setup.choices }, ..setup };
-        let numbers = |field: Field| if field.name().ends_with("_toward") { toward } else { [1.0; 3] };
-        let fields = setup.needs().fields.iter().map(numbers).collect();
-        let fragments = vec![LitFragment { inputs, held: inputs.fragment(setup, 0.0), fields }];
-        let light = Arc::clone(lights.of(LightKind::Dark));
-        Self { setup, params: Params::defaults(setup.form), light, loss: Loss::L2, fragments }
+        let numbers = |name: &str| if name.ends_with("_toward") { toward } else { [1.0; 3] };
+        let fields = setup.needs().fields.iter().map(|field| numbers(field.name())).collect();
+        let fragments = vec![LitFragment::new(setup, inputs, fields, [0.0; 3])];
+        let (params, light) = (Params::defaults(setup.form), Arc::clone(lights.of(LightKind::Dark)));
+        Self { fragments, ..Self::bare(setup, params, light) }
     }
 }

@@ -3,10 +3,11 @@
 //! - [`case`]: the numbers that evaluators are given; [`lights`]: what they look up
 //! - [`hard`]: the hard cases of MODEL 7, a declaration each; [`demands`]: those of engines and fits
 //! - [`random`]: random cases; [`lit`]: those of lights, their mirror images and the sky; [`scene`]: a scene's own
-//!   samples; [`kept`]: cases kept in files
+//!   samples; [`declared`]: what files declare for its effects; [`kept`]: cases kept in files
 //! - [`evaluate`]: what an evaluator is; [`plain`]: the model as one, by the [`rules`]; [`objectives`]: engines;
 //!   `shader`: the renderer's rules on an adapter
-//! - [`mod@reference`]: the model in f64, and how far rounding may move it
+//! - [`mod@reference`]: the model in f64, and how far rounding may move it; `lit_case`, `tried`: what engines alone are given,
+//!   and what they may make of it
 //! - [`check`]: an answer held against the reference; [`search`]: the search, and failures made simple
 //! - [`report`]: what came of it
 //!
@@ -14,6 +15,7 @@
 
 pub mod case;
 pub mod check;
+pub mod declared;
 pub mod demands;
 pub mod engine_factory;
 pub mod evaluate;
@@ -31,9 +33,11 @@ pub mod rules;
 pub mod scene;
 pub mod search;
 pub mod shader;
+mod tried;
 
 use case::Batch;
 use check::{Verdict, check_against, check_frame};
+use declared::Declared;
 use demands::{Circumstances, DEMANDS};
 use evaluate::{Evaluator, Evaluators};
 use kept::KeptCase;
@@ -82,6 +86,7 @@ impl Study {
             + DEMANDS.len()
             + self.kept.iter().map(|case| self.lights_of(case).len()).sum::<usize>()
             + self.scenes.iter().map(|scene| scene.batches.len()).sum::<usize>()
+            + self.declared().map(|(_, declared)| declared.batches(self.cases)).sum::<usize>()
             + self.cases
             + lit::batches(self.cases)
     }
@@ -130,12 +135,21 @@ impl Study {
             }
             report.add_scene(self.called(scene), swept);
         }
+        for (scene, declared) in self.declared() {
+            let tallies = declared::search(evaluators, declared, (self.seed, self.cases), progress);
+            report.add_declared(self.called(scene), tallies);
+        }
         let mut hunt = Hunt::new(evaluators, &self.lights);
         hunt.random(self.seed, self.cases, progress);
         report.lit = lit::search(evaluators, &self.lights, (self.seed, self.cases), progress);
         report.random = hunt.tallies;
         report.found.extend(hunt.found);
         report
+    }
+
+    /// The scenes for whose effects files declare parameters.
+    fn declared(&self) -> impl Iterator<Item = (&SweptScene, &Declared)> {
+        self.scenes.iter().filter_map(|scene| Some((scene, scene.declared.as_ref()?)))
     }
 
     /// A scene's name, where there are several.

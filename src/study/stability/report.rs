@@ -34,6 +34,8 @@ pub struct Report {
     pub lit: Vec<Tally>,
     /// For each evaluator, the samples of all scenes.
     pub swept: Vec<Tally>,
+    /// For each evaluator that is an engine, what files declare for the effects of all scenes.
+    pub declared: Vec<Tally>,
     /// The same of each scene, by its name, where there are several.
     pub scenes: Vec<(String, Vec<Tally>)>,
     /// New hard cases.
@@ -65,6 +67,7 @@ impl Report {
             hard: vec![0; count],
             random: tallies.clone(),
             lit: tallies.clone(),
+            declared: tallies.clone(),
             swept: tallies,
             seed,
             ..Self::default()
@@ -94,13 +97,18 @@ impl Report {
         for (all, own) in self.swept.iter_mut().zip(&hunt.tallies) {
             all.merge(own);
         }
-        let place = |failure: String| match name {
-            Some(name) => format!("in {name}: {failure}"),
-            None => failure,
-        };
-        self.found
-            .extend(hunt.found.into_iter().map(|found| Found { failure: place(found.failure), ..found }));
+        self.found.extend(
+            hunt.found.into_iter().map(|found| Found { failure: placed(name, &found.failure), ..found }),
+        );
         self.scenes.extend(name.map(|name| (name.to_owned(), hunt.tallies)));
+    }
+
+    /// Take note of what became of the parameters that files declare for a scene's effects.
+    pub fn add_declared(&mut self, name: Option<&str>, tallies: Vec<Tally>) {
+        for (all, mut own) in self.declared.iter_mut().zip(tallies) {
+            own.worst.failure = own.worst.failure.map(|failure| placed(name, &failure));
+            all.merge(&own);
+        }
     }
 
     /// The searches; of several scenes each one's samples by themselves.
@@ -111,6 +119,9 @@ impl Report {
             of("random search", "random search", self.random.as_slice()),
             of("random lights", "random lights", &self.lit),
         ];
+        if self.declared.iter().any(|tally| tally.tried > 0) {
+            all.push(of("declared parameters", "declared parameters", &self.declared));
+        }
         if self.scenes.is_empty() {
             all.push(of("scene", "the scene's samples", &self.swept));
         }
@@ -178,13 +189,15 @@ impl Report {
         }
         text.push('\n');
         for (index, name) in self.evaluators.iter().enumerate() {
-            let [random, lit, swept] = [&self.random, &self.lit, &self.swept].map(|tallies| &tallies[index]);
+            let all = [&self.random, &self.lit, &self.declared, &self.swept];
+            let [random, lit, declared, swept] = all.map(|tallies| &tallies[index]);
             let _ = writeln!(
                 text,
-                "{name}: {} hard cases, {} random ones, {} of lights, {} samples of the {}; {}",
+                "{name}: {} hard cases, {} random ones, {} of lights, {} of declared parameters, {} samples of the {}; {}",
                 self.hard[index],
                 random.tried,
                 lit.tried,
+                declared.tried,
                 swept.tried,
                 if self.scenes.is_empty() { "scene" } else { "scenes" },
                 match self.failed(index) {
@@ -202,6 +215,7 @@ impl Report {
         self.rows.iter().filter(failed).count()
             + self.random[index].failed
             + self.lit[index].failed
+            + self.declared[index].failed
             + self.swept[index].failed
     }
 
@@ -225,6 +239,7 @@ impl Report {
             hard: self.hard[i],
             random: tally(&self.random[i]),
             lights: tally(&self.lit[i]),
+            declared: tally(&self.declared[i]),
             scene: tally(&self.swept[i]),
             scenes: self.scenes.iter().map(|(name, tallies)| (name.as_str(), tally(&tallies[i]))).collect(),
             cases: self
@@ -246,6 +261,11 @@ impl Report {
         };
         serde_json::to_string_pretty(&out).map(|text| text + "\n")
     }
+}
+
+/// A failure with the scene that it is of, where there are several.
+fn placed(scene: Option<&str>, failure: &str) -> String {
+    scene.map_or_else(|| failure.to_owned(), |scene| format!("in {scene}: {failure}"))
 }
 
 /// A deviation, its share of the tolerance, and that it failed.
@@ -273,6 +293,7 @@ struct OutEngine<'a> {
     hard: usize,
     random: OutTally,
     lights: OutTally,
+    declared: OutTally,
     /// Of all scenes.
     scene: OutTally,
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]

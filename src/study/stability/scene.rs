@@ -3,13 +3,14 @@
 use std::path::Path;
 
 use super::case::{Batch, FragmentInputs, Setting};
+use super::declared::{Declared, declares};
 use super::lights::{LightBox, LightKind};
 use crate::model::effects::{Effect, Effects, Form};
 use crate::model::evaluate::Setup;
 use crate::model::fragment::Fragment;
 use crate::model::params::Param;
 use crate::model::terms::TermName;
-use crate::prepare::{PrepareError, PrepareOptions, Sampled};
+use crate::prepare::{Baked, PrepareError, PrepareOptions, Sampled};
 use crate::samples::{LANES, ViewSamples};
 use crate::scene::{LoadOptions, Scene};
 
@@ -27,6 +28,8 @@ pub struct SweptScene {
     pub lights: LightBox,
     /// Its samples in every setting.
     pub batches: Vec<Batch>,
+    /// Its own effects, where files declare parameters of them.
+    pub declared: Option<Declared>,
     /// What the user should know.
     pub warnings: Vec<String>,
 }
@@ -40,13 +43,14 @@ impl SweptScene {
         let load = LoadOptions { targets: false, ..LoadOptions::default() };
         let (scene, _) = Scene::load(path, &load)?;
         let effects = sweepable(scene.effects, scene.environment.is_some());
+        let declared = declares(scene.effects).then(|| Declared::read(path, cache)).transpose()?;
         drop(scene);
         let cache = cache.map(Path::to_owned);
         let options = PrepareOptions { effects: Some(effects), cache, ..PrepareOptions::default() };
         let sampled = Sampled::new(path, &options)?;
         let batches = batches(&sampled, effects);
-        let Sampled { baked, .. } = sampled;
-        Ok(Self { name, batches, lights: LightBox::new(Some(baked.illumination)), warnings: baked.warnings })
+        let Sampled { baked: Baked { illumination, warnings, .. }, .. } = sampled;
+        Ok(Self { name, batches, declared, lights: LightBox::new(Some(illumination)), warnings })
     }
 }
 
@@ -85,17 +89,21 @@ pub fn batches(sampled: &Sampled, effects: Effects) -> Vec<Batch> {
     settings.into_iter().map(|setting| Batch { setting, fragments: fragments.clone() }).collect()
 }
 
-/// Samples of a view, evenly drawn.
-fn fragments(view: &ViewSamples, form: Form) -> Vec<FragmentInputs> {
+/// Samples of a view, evenly drawn: their slots.
+pub(super) fn spread(view: &ViewSamples) -> impl Iterator<Item = usize> {
     let slots = 0..view.records() * LANES;
     let samples: Vec<usize> = slots.filter(|&slot| view.surface.weight(slot) > 0.0).collect();
     let step = samples.len().div_ceil(OF_A_VIEW).max(1);
-    samples.into_iter().step_by(step).map(|slot| fragment(&view.surface.fragment(slot), form)).collect()
+    samples.into_iter().step_by(step)
+}
+
+fn fragments(view: &ViewSamples, form: Form) -> Vec<FragmentInputs> {
+    spread(view).map(|slot| fragment(&view.surface.fragment(slot), form)).collect()
 }
 
 /// A stored sample as a rasteriser would give it: base for N and bump for T, under a texel that takes both as
 /// they are.
-fn fragment(f: &Fragment<f32>, form: Form) -> FragmentInputs {
+pub(super) fn fragment(f: &Fragment<f32>, form: Form) -> FragmentInputs {
     let wide = |v: [f32; 3]| v.map(f64::from);
     FragmentInputs {
         texel: match form {

@@ -7,6 +7,7 @@ use serde_json::Value;
 
 use super::damaged::sandbox_case;
 use super::sandbox::{Ran, Sandbox};
+use crate::added_term::FRESNEL;
 
 /// Enough to try everything, and no more.
 const SHORT: [&str; 7] = ["--no-gpu", "--cases", "500", "--pixels", "1000", "-o", "stable"];
@@ -68,6 +69,56 @@ fn a_failure_that_is_put_there_is_found_again_and_a_case_that_is_sound_passes() 
     assert_eq!(ran.code, Some(0), "{ran:?}");
     let report = sandbox.json("stable/stability.json");
     assert!(rows(&report).iter().all(Value::is_null) && report["failed"] == 0, "{report}");
+}
+
+/// Sound but where its parameter is 0: the root's derivative has no end there.
+const GLOW: &str = "\
+// effect: glow, light without a source
+// parameter: glow_spread = 0.5 in [0, 4]; how far it goes; a test
+//
+// gives: glow_part
+// adds: glow
+// cost: 6
+fn glow_light(albedo: vec3f, glow_spread: f32) -> vec3f {
+    return sqrt(glow_spread) * albedo;
+}
+";
+
+#[test]
+fn what_a_scenes_own_terms_declare_is_searched_and_the_one_that_breaks_is_named() {
+    let sandbox = Sandbox::new();
+    sandbox.write("fresnel.wgsl", FRESNEL.as_bytes());
+    sandbox.write("glow.wgsl", GLOW.as_bytes());
+    let sound = "\"reflection\", \"fresnel_reflection\"]\nterms = [\"fresnel.wgsl\"]";
+    sandbox.edit("\"reflection\"]", sound);
+    let declared = |name: &str| {
+        let report = sandbox.json("stable/stability.json");
+        let engine = report["engines"].as_array().unwrap().iter().find(|engine| engine["name"] == name);
+        engine.unwrap()["declared"].clone()
+    };
+    let ran = study(&sandbox, "2");
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    assert!(ran.out.contains("\ndeclared parameters "), "{ran:?}");
+    let tally = declared("CPU engine");
+    assert!(tally["tried"].as_u64().unwrap() > 500 && tally["failed"] == 0, "{tally}");
+    // f32 is not f64: a deviation of exactly 0 would mean that nothing was compared.
+    assert!(tally["worst"]["deviation"].as_f64().unwrap() > 0.0, "{tally}");
+    // What is no engine computes the paper's effects alone.
+    assert_eq!(declared("model f32")["tried"], 0);
+
+    let broken =
+        "\"reflection\", \"fresnel_reflection\", \"glow\"]\nterms = [\"fresnel.wgsl\", \"glow.wgsl\"]";
+    sandbox.edit(sound, broken);
+    let ran = study(&sandbox, "2");
+    assert_eq!(ran.code, Some(1), "{ran:?}");
+    // Of the sixty-four fragments with that value no gradient is answered for.
+    for words in [
+        "declared parameters: CPU engine: at least 64 of ",
+        "glow_spread = 0 of glow, Corrected, {\"glow\"}, ",
+        "in f64 the gradient by glow_spread is ",
+    ] {
+        assert!(ran.err.contains(words), "{words}: {ran:?}");
+    }
 }
 
 #[test]
