@@ -11,6 +11,7 @@
 
 mod accuracy;
 mod animation;
+mod blurs;
 mod builds;
 mod clip;
 mod closeup;
@@ -66,6 +67,7 @@ const FILES: &[(&str, Measure)] = &[
     ("experiments/accuracy_vs_time/results.json", studies::tradeoff),
     ("experiments/accuracy_vs_time/light.json", ways::light),
     ("experiments/accuracy_vs_time/diffusion.json", ways::diffusion),
+    ("experiments/accuracy_vs_time/blurs.json", blurs::measure),
     ("experiments/effects_cost/results.json", timings::effects_cost),
     ("experiments/effects_cost/card.json", timings::effects_cost_on_a_card),
     ("experiments/effects_cost/passes.json", passes::processor),

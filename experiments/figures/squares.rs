@@ -22,7 +22,11 @@ pub(crate) struct Shown {
     pub(crate) pixels: Vec<[f32; 3]>,
 }
 
-fn read(path: &Path) -> Result<Shown> {
+/// The colours of an EXR file.
+///
+/// # Errors
+/// When it cannot be read.
+pub(crate) fn read(path: &Path) -> Result<Shown> {
     let image = read_first_rgba_layer_from_file(
         path,
         |size, _| Shown { width: size.width(), pixels: vec![[0.0; 3]; size.area()] },
@@ -53,20 +57,36 @@ pub(crate) fn drawn(lab: &Lab, run: &Path, places: &[Place]) -> Result<Vec<Shown
 
 /// Write the squares as a PNG `file`, all tone mapped alike.
 pub(crate) fn side_by_side(columns: &[Vec<Shown>], places: &[Place], file: &str) -> Result<()> {
-    let [across, down] = [columns.len(), places.len()].map(|count| count as u32 * (SIDE + GAP) - GAP);
+    let square = |(shown, (_, square)): (&Shown, &Place)| cut(&toned(shown), *square);
+    let column = |views: &Vec<Shown>| views.iter().zip(places).map(square).collect();
+    laid_out(&columns.iter().map(column).collect::<Vec<_>>(), file)
+}
+
+/// As a screen shows it.
+pub(crate) fn toned(shown: &Shown) -> RgbImage {
+    coloured(shown, |i| ToneMap::default().encode_bytes(shown.pixels[i]))
+}
+
+/// An image of the same size, of a colour a pixel.
+pub(crate) fn coloured(shown: &Shown, colour: impl Fn(usize) -> [u8; 3]) -> RgbImage {
+    let pixel = |column: u32, row: u32| Rgb(colour(row as usize * shown.width + column as usize));
+    RgbImage::from_fn(shown.width as u32, (shown.pixels.len() / shown.width) as u32, pixel)
+}
+
+/// A square of an image, by left, top and side, as large as all are laid out.
+pub(crate) fn cut(image: &RgbImage, [left, top, side]: [u32; 3]) -> RgbImage {
+    resize(&crop_imm(image, left, top, side, side).to_image(), SIDE, SIDE, FilterType::CatmullRom)
+}
+
+/// Write squares as a PNG `file`, column by column.
+pub(crate) fn laid_out(columns: &[Vec<RgbImage>], file: &str) -> Result<()> {
+    let rows = columns.iter().map(Vec::len).max().unwrap_or_default();
+    let [across, down] = [columns.len(), rows].map(|count| count as u32 * (SIDE + GAP) - GAP);
     let mut all = RgbImage::from_pixel(across, down, Rgb([24; 3]));
-    for (i, views) in columns.iter().enumerate() {
-        for (k, (shown, (_, [x, y, side]))) in views.iter().zip(places).enumerate() {
-            let pixel = |column: u32, row: u32| {
-                let linear = shown.pixels[row as usize * shown.width + column as usize];
-                Rgb(ToneMap::default().encode_bytes(linear))
-            };
-            let height = (shown.pixels.len() / shown.width) as u32;
-            let image = RgbImage::from_fn(shown.width as u32, height, pixel);
-            let square = crop_imm(&image, *x, *y, *side, *side).to_image();
-            let square = resize(&square, SIDE, SIDE, FilterType::CatmullRom);
+    for (i, column) in columns.iter().enumerate() {
+        for (k, square) in column.iter().enumerate() {
             let [left, top] = [i, k].map(|place| place as i64 * i64::from(SIDE + GAP));
-            replace(&mut all, &square, left, top);
+            replace(&mut all, square, left, top);
         }
     }
     Ok(all.save(file)?)

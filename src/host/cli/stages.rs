@@ -128,18 +128,17 @@ pub(super) fn free_of(baked: &Baked) -> Vec<Param> {
 fn caption(name: &str, image: &Image, params: &Params) -> String {
     match name {
         "charts" => "charts: a colour for each".to_owned(),
-        "stretch" => format!(
-            "stretch: red along u, green along v; 1 is {} of the scene's units a texel",
-            number(f64::from(largest(image)), 3)
-        ),
+        "stretch" => {
+            let millimetres = params.scalar_named("diffusion_unit") * f64::from(largest(image));
+            format!("stretch: red along u, green along v; 1 is {} mm a texel", number(millimetres, 3))
+        }
         "light_map" => "light map: linear radiance, before it is blurred".to_owned(),
         "sum" => "sum of the levels by their weights: linear radiance, looked up by pixels".to_owned(),
         _ => match name.strip_prefix("level_").and_then(|k| k.parse::<usize>().ok()) {
             Some(level) => {
-                let of = |k: usize| Param::from_name(&format!("diffusion_radius_{k}"));
                 // The variances of blurs of blurs add.
                 let variance: f64 =
-                    (1..=level).filter_map(of).map(|param| params.scalar(param).powi(2)).sum();
+                    (1..=level).map(|k| params.scalar_named(&format!("diffusion_radius_{k}")).powi(2)).sum();
                 let deviation = number(variance.sqrt(), 3);
                 format!("level {level}: linear radiance, the light map blurred by {deviation} mm")
             }
@@ -215,6 +214,7 @@ fn on_screen(image: &Image, shown: Shown) -> Image {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::effects::Form;
 
     #[test]
     fn levels_and_how_they_move_have_files_of_their_own() {
@@ -228,5 +228,19 @@ mod tests {
         for other in ["diffusion_level_1_along_u", "d0_diffusion_level_1_along_u", "d7_diffusion_level_1"] {
             assert_eq!(file(other), None, "{other}");
         }
+    }
+
+    #[test]
+    fn captions_tell_lengths_in_millimetres() {
+        let mut params = Params::defaults(Form::Corrected);
+        let radii = [("diffusion_unit", 50.0), ("diffusion_radius_1", 3.0), ("diffusion_radius_2", 4.0)];
+        for (name, value) in radii {
+            params.set(Param::from_name(name).unwrap(), value);
+        }
+        let mut image = Image::new(2, 1);
+        // Of a unit of 50 mm.
+        image.rgb[1] = [0.25, 0.5, 0.0];
+        assert!(caption("stretch", &image, &params).ends_with("; 1 is 25.0 mm a texel"));
+        assert!(caption("level_2", &image, &params).ends_with(" by 5.00 mm"));
     }
 }

@@ -1,0 +1,146 @@
+//! experiments/accuracy_vs_time/blurs.json, and docs/images/blurs.png: where on the face blurs along the atlas' axes differ from
+//! Gaussians by distance over the surface.
+
+use std::path::Path;
+
+use image::{Rgb, RgbImage};
+use serde_json::{Map, Value, json};
+use skinfit::report::pictures::magma;
+
+use crate::lab::{Choice, Lab, Result};
+use crate::squares::{Shown, coloured, cut, laid_out, read, toned};
+
+/// Of the scanned head's scenes that in which they differ most.
+const SCENE: &str = "studio";
+const VIEW: &str = "front";
+
+/// What the others are measured against. Levels are added up in texels, so that what pixels look up is a picture of the atlas.
+const SURFACE: Choice = ("surface", &[("diffusion", "{ combined = \"map\", method = \"surface\" }")]);
+const CHOICES: [Choice; 4] = [
+    ("as the scene has it", &[("diffusion", "{ combined = \"map\" }")]),
+    ("`taps = \"full\"`", &[("diffusion", "{ combined = \"map\", taps = \"full\" }")]),
+    ("`seams = \"joined\"`", &[("diffusion", "{ combined = \"map\", seams = \"joined\" }")]),
+    ("`light_map_size = 256`", &[("diffusion", "{ combined = \"map\", light_map_size = 256 }")]),
+];
+/// Nothing is free that moves a level, so that stages are not made of how levels move.
+const HELD: [(&str, &str); 2] = [("fit.free", "[\"rim_weight\"]"), ("fit.per_channel", "[\"rim_weight\"]")];
+
+/// What the picture shows of the view, by left, top and side: the head, and eyes to mouth.
+const SQUARES: [[u32; 3]; 2] = [[66, 36, 246], [118, 136, 130]];
+/// Parts of the face in the view: left, top, width and height of what holds each.
+const PARTS: [(&str, &[[usize; 4]]); 5] = [
+    ("lids", &[[118, 142, 132, 38]]),
+    ("nose", &[[164, 180, 48, 40]]),
+    ("mouth", &[[158, 224, 70, 38]]),
+    ("ears", &[[86, 152, 24, 70], [258, 150, 32, 74]]),
+    ("forehead", &[[130, 60, 120, 70]]),
+];
+
+/// The brightest colour stands for so much, in percent of the reference's root mean square.
+const MOST: f64 = 5.0;
+/// Pixels at the foot of each square in which the scale stands, from 0 on the left to [`MOST`].
+const SCALE: u32 = 8;
+
+/// What a choice makes: the view, and what pixels look up in the atlas.
+struct Made {
+    view: Shown,
+    atlas: Shown,
+}
+
+/// What a choice makes, and the reference of it.
+type Pair<'a> = (&'a Shown, &'a Shown);
+
+/// A row a choice: how far its view is off, whole and by parts, and its atlas, in percent.
+pub(crate) fn measure(lab: &Lab) -> Result<Value> {
+    let (_, run) = lab.fit(SCENE, Some(&lab.head_scene(SCENE, "full.toml")), &[])?;
+    let params = run.join("params.toml");
+    let surface = made(lab, SURFACE, &params)?;
+    let mut columns = vec![squares(&toned(&surface.view), Some(&toned(&surface.atlas)))];
+    let mut rows = Vec::new();
+    for choice in CHOICES {
+        let found = made(lab, choice, &params)?;
+        let view = (&found.view, &surface.view);
+        // A texel of an atlas of another size is another place.
+        let same = found.atlas.pixels.len() == surface.atlas.pixels.len();
+        let atlas = same.then_some((&found.atlas, &surface.atlas));
+        rows.push(row(choice.0, view, atlas));
+        let heats = squares(&heat(view), atlas.map(heat).as_ref());
+        columns.push(heats.into_iter().map(with_scale).collect());
+    }
+    laid_out(&columns, "docs/images/blurs.png")?;
+    Ok(json!({ "most": MOST, "rows": rows }))
+}
+
+fn row(name: &str, view: Pair<'_>, atlas: Option<Pair<'_>>) -> Value {
+    let part = |(name, places): (&str, &[[usize; 4]])| {
+        let off = percent(view, |x, y| places.iter().any(|place| holds(*place, x, y)));
+        (name.to_owned(), off.into())
+    };
+    json!({
+        "name": name,
+        "view": percent(view, |_, _| true),
+        "parts": PARTS.into_iter().map(part).collect::<Map<String, Value>>(),
+        "atlas": atlas.map(|atlas| percent(atlas, |_, _| true)),
+    })
+}
+
+/// What a choice makes at the constants of a fit.
+fn made(lab: &Lab, (name, settings): Choice, params: &Path) -> Result<Made> {
+    let scene = lab.scene(name, &lab.head_scene(SCENE, "full.toml"), &[settings, &HELD].concat())?;
+    let (image, baked) = (scene.with_extension("exr"), scene.with_extension("baked"));
+    let run = |command: &str, options: &[&str], output: &Path| {
+        let [scene, params, output] =
+            [scene.as_path(), params, output].map(|path| path.display().to_string());
+        let arguments = [&[command, &scene, "--params", &params, "-o", &output], options].concat();
+        lab.skinfit(&format!("{command}, {name}"), &arguments, false)
+    };
+    run("render", &["--view", VIEW, "--engine", "cpu"], &image)?;
+    run("bake", &["--stages"], &baked)?;
+    Ok(Made { view: read(&image)?, atlas: read(&baked.join("sum.exr"))? })
+}
+
+/// Whether a pixel lies in left, top, width and height.
+fn holds([left, top, width, height]: [usize; 4], x: usize, y: usize) -> bool {
+    (left..left + width).contains(&x) && (top..top + height).contains(&y)
+}
+
+/// The root mean square difference among the pixels that are meant, in percent of the reference's there.
+fn percent((found, reference): Pair<'_>, meant: impl Fn(usize, usize) -> bool) -> f64 {
+    let (mut misfit, mut energy) = (0.0, 0.0);
+    for (i, (got, want)) in found.pixels.iter().zip(&reference.pixels).enumerate() {
+        if meant(i % reference.width, i / reference.width) {
+            misfit += difference(*got, *want);
+            energy += difference(*want, [0.0; 3]);
+        }
+    }
+    100.0 * (misfit / energy).sqrt()
+}
+
+/// The sum of squared differences.
+fn difference(a: [f32; 3], b: [f32; 3]) -> f64 {
+    a.into_iter().zip(b).map(|(a, b)| f64::from(a - b).powi(2)).sum()
+}
+
+/// The difference pixel by pixel, as a share of [`MOST`] in magma; black where the reference shows nothing.
+fn heat((found, reference): Pair<'_>) -> RgbImage {
+    let energies =
+        reference.pixels.iter().map(|rgb| difference(*rgb, [0.0; 3])).filter(|energy| *energy > 0.0);
+    let (count, sum) = energies.fold((0.0, 0.0), |(count, sum), energy| (count + 1.0, sum + energy));
+    let most = MOST / 100.0 * f64::sqrt(sum / count);
+    coloured(reference, |i| magma((difference(found.pixels[i], reference.pixels[i]).sqrt() / most) as f32))
+}
+
+/// The squares of the view, and all of the atlas.
+fn squares(view: &RgbImage, atlas: Option<&RgbImage>) -> Vec<RgbImage> {
+    let whole = atlas.map(|atlas| cut(atlas, [0, 0, atlas.width()]));
+    SQUARES.into_iter().map(|square| cut(view, square)).chain(whole).collect()
+}
+
+/// A square with the colours from 0 to [`MOST`] at its foot.
+fn with_scale(mut square: RgbImage) -> RgbImage {
+    let (width, height) = square.dimensions();
+    for (x, y) in (0..width).flat_map(|x| (height - SCALE..height).map(move |y| (x, y))) {
+        square.put_pixel(x, y, Rgb(magma(x as f32 / (width - 1) as f32)));
+    }
+    square
+}
