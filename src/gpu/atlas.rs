@@ -15,7 +15,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use wgpu::{CommandEncoder, CommandEncoderDescriptor, TextureFormat, TextureUsages, TextureView};
 
 use self::list::Texels;
-pub(crate) use self::list::{empty_near, tiles};
+pub(crate) use self::list::{empty_near, packed, tiles};
 use self::pass::AtlasPass;
 use super::compute::compute_pass;
 use super::constants::Values;

@@ -1,10 +1,12 @@
 //! Whole fits of the diffusion race: first on a window of the atlas, then on all of it.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use serde_json::{Value, json};
 use skinfit::engine::Point;
-use skinfit::fit::{FitOptions, SolverKind, fit};
+use skinfit::fit::{FitOptions, SolverKind, fit, fit_watched};
 
 use super::data::{Data, Manifest, vector};
 use super::secant::Secant;
@@ -34,9 +36,8 @@ struct Run {
 
 /// Engines over the window and over all of a target.
 struct Engines {
-    part: Box<dyn Racer>,
-    /// Its share of the pixels.
-    share: f64,
+    /// The window's, and its share of the pixels; a card makes the whole as fast as a window.
+    part: Option<(Box<dyn Racer>, f64)>,
     whole: Box<dyn Racer>,
 }
 
@@ -69,14 +70,30 @@ fn window(data: &Data, manifest: &Manifest) -> Window {
     Window { low, high: low.map(|at| at + SIDE), halo: HALO }
 }
 
-/// A fit on the window, then bounded steps over all pixels until the criterion holds.
-fn fit_to_criterion(engines: &Engines, manifest: &Manifest, which: &str, start: &Point) -> Result<Run> {
-    let clock = Instant::now();
+/// A fit on the window or, until the criterion holds, over all pixels: where it ends, and its passes over all of them.
+fn begun(engines: &Engines, manifest: &Manifest, which: &str, start: &Point) -> Result<(Point, f64)> {
+    let Some((part, share)) = &engines.part else {
+        let enough = Arc::new(AtomicBool::new(false));
+        let options = FitOptions { interrupt: Some(Arc::clone(&enough)), ..FitOptions::default() };
+        let mut watch = |_: &_, point: &Point| {
+            let met = criterion(manifest, which, point).is_ok_and(|(error, tolerance)| error < tolerance);
+            enough.store(met, Ordering::SeqCst);
+        };
+        let whole =
+            fit_watched(&*engines.whole, start, &options, &mut watch).map_err(|error| error.to_string())?;
+        return Ok((whole.end, whole.evaluations as f64));
+    };
     let options =
         FitOptions { solver: SolverKind::Lm, max_iterations: Some(ON_WINDOW), ..FitOptions::default() };
-    let part = fit(&*engines.part, start, &options, &mut |_| {}).map_err(|error| error.to_string())?;
-    let mut evaluations = part.evaluations as f64 * engines.share;
-    let (mut point, mut best) = (part.end, f64::INFINITY);
+    let part = fit(&**part, start, &options, &mut |_| {}).map_err(|error| error.to_string())?;
+    Ok((part.end, part.evaluations as f64 * share))
+}
+
+/// A first fit, then bounded steps over all pixels until the criterion holds.
+fn fit_to_criterion(engines: &Engines, manifest: &Manifest, which: &str, start: &Point) -> Result<Run> {
+    let clock = Instant::now();
+    let (mut point, mut evaluations) = begun(engines, manifest, which, start)?;
+    let mut best = f64::INFINITY;
     let mut secant = Secant::new(&*engines.whole, &point);
     for _ in 0..=MOST {
         let (error, tolerance) = criterion(manifest, which, &point)?;
@@ -96,12 +113,16 @@ pub(super) fn fits(data: &Data, manifest: &Manifest, options: &Options<'_>) -> R
     let (window, gpu) = (window(data, manifest), options.gpu.as_ref());
     let mut fits = serde_json::Map::new();
     for which in ["clean", "noisy"] {
-        let part = data.view(which, Some(&window))?;
-        let groups = |view: &skinfit::engine::view::ObservedView| view.samples.groups() as f64;
         let whole = data.view(which, None)?;
-        let share = groups(&part) / groups(&whole);
-        let [part, whole] = [part, whole].map(|view| engine(gpu, view, true, &start));
-        let engines = Engines { part: part?, share, whole: whole? };
+        let part = match gpu {
+            Some(_) => None,
+            None => {
+                let part = data.view(which, Some(&window))?;
+                let share = part.samples.groups() as f64 / whole.samples.groups() as f64;
+                Some((engine(gpu, part, true, &start)?, share))
+            }
+        };
+        let engines = Engines { part, whole: engine(gpu, whole, true, &start)? };
         let (mut seconds, mut evaluations, mut best) = (Vec::new(), 0.0, 0.0);
         let runs = options.reps.max(5);
         // The first is not counted: it is what other frameworks compile in.

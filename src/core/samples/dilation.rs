@@ -54,6 +54,16 @@ impl Dilation {
         Self { numbers: copies.collect(), ..Self::default() }
     }
 
+    /// Where filled texels each show another: their places in the atlas and the numbers of those, in the order of places;
+    /// `None` where they are means.
+    #[must_use]
+    pub fn copies(&self) -> Option<Vec<(u32, u32)>> {
+        let mut copies: Vec<(u32, u32)> =
+            self.numbers.iter().map(|(&texel, &number)| (texel, number)).collect();
+        copies.sort_unstable();
+        self.ends.is_empty().then_some(copies)
+    }
+
     /// The number of a filled texel, by its place in the atlas, row by row.
     #[must_use]
     pub fn number(&self, texel: u32) -> Option<usize> {

@@ -72,7 +72,7 @@ fn buffer(gpu: &Gpu, contents: &[u8]) -> Result<Buffer, GpuError> {
 }
 
 /// Column in the low half, row in the high one: textures have fewer than 2^16 texels a side.
-const fn packed([column, row]: [u32; 2]) -> u32 {
+pub(crate) const fn packed([column, row]: [u32; 2]) -> u32 {
     row << 16 | column
 }
 

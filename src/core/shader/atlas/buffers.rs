@@ -273,7 +273,7 @@ impl Text<'_> {
     fn fill(&self, plan: &Plan, levels: &[String]) -> LevelShader {
         let leave = |name: &String| {
             let level = self.level(name);
-            format!("    leave({level}, here, filled({level}, here));\n")
+            format!("    leave({level}, here, filled({level}, here, shown));\n")
         };
         let body = FILL.replace("{leaves}", &levels.iter().map(leave).collect::<String>());
         let mut plan = plan.clone();

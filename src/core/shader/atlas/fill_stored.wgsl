@@ -13,9 +13,12 @@ fn mean_around(level: u32, here: vec2i) -> vec4f {
     return vec4f(sum.xyz / max(sum.w, 1.0), sum.w);
 }
 
-// What an empty texel takes: that mean, in the second ring of those that the first has filled (MODEL 6.5). Below 0 in w: of no
-// chart.
-fn filled(level: u32, here: vec2i) -> vec4f {
+// What an empty texel takes: what it shows of another; or that mean, in the second ring of those that the first has filled
+// (MODEL 6.5). Below 0 in w: of no chart.
+fn filled(level: u32, here: vec2i, shown: vec2i) -> vec4f {
+    if (any(shown != here)) {
+        return vec4f(level_texel(level, shown).xyz, -1.0);
+    }
     let near = mean_around(level, here);
     if (near.w > 0.0) {
         return vec4f(near.xyz, -1.0);
@@ -31,11 +34,18 @@ fn filled(level: u32, here: vec2i) -> vec4f {
     return vec4f(sum.xyz / max(sum.w, 1.0), -1.0);
 }
 
+// Column in the low half, row in the high one.
+fn unpacked(place: u32) -> vec2i {
+    return vec2i(i32(place & 0xffffu), i32(place >> 16u));
+}
+
 @compute @workgroup_size(64)
 fn cs_main(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) workgroups: vec3u) {
     let i = id.x + 64u * workgroups.x * id.y;
-    if (i >= arrayLength(&tiles)) {
+    // The list holds pairs: an empty texel, and the one that it shows; itself where it takes a mean.
+    if (2u * i + 1u >= arrayLength(&tiles)) {
         return;
     }
-    let here = vec2i(i32(tiles[i] & 0xffffu), i32(tiles[i] >> 16u));
+    let here = unpacked(tiles[2u * i]);
+    let shown = unpacked(tiles[2u * i + 1u]);
 {leaves}}

@@ -8,6 +8,7 @@ use wgpu::{
     BindGroup, BindGroupLayout, Buffer, BufferUsages, CommandEncoder, ComputePassDescriptor, ComputePipeline,
 };
 
+use crate::atlas::{empty_near, packed};
 use crate::bake::stacks::Stack;
 use crate::compute::groups;
 use crate::constants::model_block;
@@ -40,7 +41,8 @@ pub(in crate::engine) struct MadeLevels {
 struct Stored {
     texels: Buffer,
     records: Buffer,
-    /// Tiles along u and along v, and empty texels near covered ones; and how many workgroups these are.
+    /// Tiles along u and along v, and empty texels that lookups read, each with the one that it shows; and how many workgroups
+    /// these are.
     lists: [(Buffer, u32); 3],
     /// Workgroups of the covered texels.
     workgroups: u32,
@@ -85,9 +87,9 @@ impl MadeLevels {
         }
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
         let levels = buffer(gpu, "levels", bytes as usize, usage);
-        let stored = Stored::new(gpu, &atlas);
-        gpu.check()?;
         let dilated = dilates(fused);
+        let stored = Stored::new(gpu, &atlas, dilated);
+        gpu.check()?;
         let (size, shaders) = (atlas.size(), [plain, turned]);
         Ok(Some(Self { size, dilated, shaders, passes: None, levels, stored, count: 0 }))
     }
@@ -163,8 +165,21 @@ fn made_with(shader: &LevelShader, params: &Params) -> Vec<f64> {
     block.chain(stacks.map(|(stack, _)| stack.place(params))).collect()
 }
 
+/// Pairs of texels, packed: an empty one, and the one that it shows; itself where it takes the mean of its neighbours.
+fn filled(atlas: &Atlas) -> Vec<u32> {
+    let size = atlas.size();
+    if let Some(copies) = atlas.dilation().copies() {
+        let pair = |(texel, number): (u32, u32)| {
+            [packed([texel % size, texel / size]), packed(atlas.texel(number as usize))]
+        };
+        return copies.into_iter().flat_map(pair).collect();
+    }
+    let covered: Vec<[u32; 2]> = (0..atlas.covered()).map(|place| atlas.texel(place)).collect();
+    empty_near(&covered, size).into_iter().flat_map(|texel| [texel; 2]).collect()
+}
+
 impl Stored {
-    fn new(gpu: &Gpu, atlas: &Atlas) -> Self {
+    fn new(gpu: &Gpu, atlas: &Atlas, dilated: bool) -> Self {
         let places = || (0..atlas.covered()).map(|place| atlas.texel(place));
         let list = |places: Vec<u32>, each: u32| {
             let workgroups = (places.len() as u32).div_ceil(each);
@@ -187,7 +202,7 @@ impl Stored {
             lists: [
                 tiles(Axis::U),
                 tiles(Axis::V),
-                list(crate::atlas::empty_near(&places().collect::<Vec<_>>(), atlas.size()), TEXELS),
+                list(if dilated { filled(atlas) } else { Vec::new() }, 2 * TEXELS),
             ],
         }
     }
