@@ -90,6 +90,34 @@ fn levels_and_how_they_move_are_the_f64_models_whatever_is_chosen() {
 }
 
 #[test]
+fn empty_texels_that_show_another_do_so_on_an_adapter() {
+    let Some(gpu) = gpu() else { return };
+    let observed = observed(head(DiffusionChoices { lookup: Lookup::Dilated, ..DiffusionChoices::DEFAULT }));
+    let unknowns: Vec<Unknown> =
+        ["base_weight", "diffusion_radius_2"].map(|name| Unknown::Param(Column::tied(param(name)))).to_vec();
+    let means = Task { unknowns: unknowns.clone(), ..observed.task() };
+    let mut view = means.views[0].clone();
+    let atlas = view.samples.atlas.as_deref().cloned().unwrap();
+    let texels = atlas.size() * atlas.size();
+    let [column, row] = atlas.texel(atlas.covered() / 3);
+    let one = row * atlas.size() + column;
+    view.samples.atlas = Some(Arc::new(atlas.with_shown((0..texels).map(|texel| (texel, one)))));
+    let shown = Task { views: Arc::new([view]), ..means.clone() };
+    let point = observed.start();
+    let f64 = |task: &Task| {
+        let model =
+            Reference::new(task.setup, &task.illumination, &task.views, task.loss, &unknowns).unwrap();
+        model.normal_equations(&point)
+    };
+    let engine = GpuEngine::new(gpu, shown.clone(), &point, Memory::default()).unwrap();
+    let found = engine.normal_equations(&point);
+    // As above; where the texels about charts are means, the light at their borders is another.
+    let off = deviation(&found, &f64(&shown), &unknowns);
+    assert!(off.size < 1e-4, "{}: {}", off.what, off.size);
+    assert!(deviation(&found, &f64(&means), &unknowns).size > 1e-3);
+}
+
+#[test]
 fn a_renderer_makes_levels_once_and_again_when_the_mesh_has_moved() {
     let Some(gpu) = gpu() else { return };
     let baked = head(DiffusionChoices::DEFAULT);
