@@ -3,20 +3,26 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
+use fearless_simd::Level;
 use skinfit::engine::lanes::Lanes;
 use skinfit::model::cube::{Channel, Cube};
+use skinfit::model::effects::Effects;
 use skinfit::model::evaluate::Setup;
 use skinfit::model::params::{Param, Params};
 use skinfit::model::real::Real;
 use skinfit::samples::LANES;
 use skinfit::shader::facts::{FaceSizes, MapFacts};
+use skinfit::shader::rule::{LIBRARY, rules};
 use skinfit::shader::tangent::Tangents;
 use skinfit::shader::tangent::chain::Seed;
 use skinfit::shader::{Facts, Source};
+use skinfit::simd::levels;
 use skinfit_core::program::graph::{Graph, Input};
 use skinfit_core::program::lower::{self, Natives, Value};
 use skinfit_core::program::shading::{Shading, constant};
 use skinfit_core::program::steps::{self, Rounding, Steps};
+
+use crate::vectors::reader::{Tolerance, Tolerances};
 
 /// A number that holds one or more of f64's.
 pub(crate) trait Number: Real<Texel: Channel> {
@@ -64,6 +70,58 @@ impl<S: fearless_simd::Simd> Number for Lanes<S> {
     }
     fn unpack(self) -> Vec<f64> {
         self.to_array().map(f64::from).to_vec()
+    }
+}
+
+/// A kind of number.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Kind {
+    Double,
+    Single,
+    /// SIMD lanes of an instruction set.
+    InLanes(Level),
+}
+
+/// What generic code makes in numbers of a [`Kind`], of one of them, `like`.
+macro_rules! in_kind {
+    ($kind:expr, $like:ident => $made:expr) => {
+        match $kind {
+            $crate::by_rules::Kind::Double => {
+                let $like = 0.0_f64;
+                $made
+            }
+            $crate::by_rules::Kind::Single => {
+                let $like = 0.0_f32;
+                $made
+            }
+            $crate::by_rules::Kind::InLanes(level) => skinfit_core::with_simd!(level, simd => {
+                let $like = ::skinfit::engine::lanes::Lanes::splat(simd, 0.0);
+                $made
+            }),
+        }
+    };
+}
+pub(crate) use in_kind;
+
+impl Kind {
+    /// All that this machine runs.
+    pub(crate) fn all() -> Vec<Self> {
+        std::iter::once(Self::Double).chain(Self::narrow()).collect()
+    }
+
+    /// Those of 32 bits.
+    pub(crate) fn narrow() -> Vec<Self> {
+        std::iter::once(Self::Single).chain(levels().into_iter().map(Self::InLanes)).collect()
+    }
+
+    /// What is near in them: lanes have exp2 and log2 by polynomials of some units in the last place, and fuse products
+    /// with sums, where f32 rounds each correctly.
+    pub(crate) fn near(self, near: Tolerances) -> Tolerance {
+        match self {
+            Self::Double => near.double,
+            Self::Single => near.single,
+            Self::InLanes(_) => near.single.times(4.0),
+        }
     }
 }
 
@@ -186,6 +244,14 @@ impl Function {
         Self(Steps::new(&graph, &outputs, |_| Rounding::Plain))
     }
 
+    /// The function of a rule that those effects bring, with what it uses.
+    pub(crate) fn of_rule(effects: Effects, name: &str, arguments: &[usize]) -> Self {
+        let rule = rules(effects).find(|rule| rule.function == name);
+        let rule = rule.unwrap_or_else(|| panic!("there is no rule {name}"));
+        let used = LIBRARY.iter().filter(|(library, _)| rule.uses.contains(library)).map(|(_, text)| *text);
+        Self::new(&used.chain([rule.body]).collect::<Vec<_>>(), name, arguments)
+    }
+
     /// How the function moves along one of its arguments, a number: of its arguments, then of that one's tangent.
     pub(crate) fn tangent(texts: &[&str], name: &str, arguments: &[usize], moved: usize) -> Self {
         let text = texts.concat();
@@ -205,5 +271,16 @@ impl Function {
             arguments[name.parse::<usize>().unwrap()][*component]
         });
         self.0.outputs(&setting, &registers).collect()
+    }
+    /// Its value in a kind of number.
+    pub(crate) fn of_kind(&self, kind: Kind, arguments: &[&[f64]]) -> Vec<f64> {
+        in_kind!(kind, like => self.of_numbers(like, arguments))
+    }
+
+    fn of_numbers<R: Number>(&self, like: R, arguments: &[&[f64]]) -> Vec<f64> {
+        let given = |list: &&[f64]| list.iter().map(|&x| like.lit(x)).collect();
+        let given: Vec<Vec<R>> = arguments.iter().map(given).collect();
+        let given: Vec<&[R]> = given.iter().map(|list| &list[..]).collect();
+        self.of(like, &given).into_iter().map(|x| x.unpack()[0]).collect()
     }
 }

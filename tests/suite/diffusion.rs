@@ -13,7 +13,6 @@ use skinfit::samples::surface_records::{Asked, NEUTRAL, Unmade};
 use skinfit::samples::{Atlas, LANES, SurfaceRecords, ViewSamples};
 use skinfit::shader::Facts;
 use skinfit::shader::facts::FaceSizes;
-use skinfit::shader::rule::rules;
 use skinfit::shader::tangent::chain::Seed;
 use skinfit::shader::term::{Term, library, register};
 use skinfit_core::program::graph::Input;
@@ -629,8 +628,7 @@ pub(crate) fn clamped_vector<R: Number>(file: &Node<'_>) {
 /// The levels as the rules mix them, which have the first one's weight as what the others leave.
 fn mixed_by_rule(levels: &[Vec<Vec<[f64; 3]>>], weights: &[[f64; 3]]) -> Vec<f64> {
     let effects = setup(DiffusionChoices::DEFAULT).effects;
-    let rule = rules(effects).find(|rule| rule.function == "scattered_of_three").unwrap();
-    let mixing = Function::new(&[rule.body], rule.function, &[3; 7]);
+    let mixing = Function::of_rule(effects, "scattered_of_three", &[3; 7]);
     for c in 0..3 {
         assert!((weights.iter().map(|weight| weight[c]).sum::<f64>() - 1.0).abs() < 1e-12);
     }

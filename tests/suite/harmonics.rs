@@ -180,7 +180,7 @@ fn environment_vector(vectors: &Vectors, file: &Node<'_>) {
 }
 
 /// The light of a case.
-fn case_light(vectors: &Vectors, file: &Node<'_>, case: &Node<'_>) -> Coefficients {
+pub(crate) fn case_light(vectors: &Vectors, file: &Node<'_>, case: &Node<'_>) -> Coefficients {
     let environment = case.at("environment");
     if let Some(delta) = environment.get("delta") {
         let rgb = environment.at("rgb").three();

@@ -16,6 +16,7 @@ use skinfit::scene::light::{Beam, Cone, Lamp, NEAREST, THINNEST_EDGE};
 use skinfit::scene::maps::Spots;
 use skinfit::scene::sky_lights::sky_lights;
 use skinfit::scene::{Light, LightKind, LoadOptions, Scene};
+use skinfit::shader::term::library;
 
 use crate::common;
 use crate::figures::measured;
@@ -54,6 +55,20 @@ pub(crate) fn light_of(inputs: &Node<'_>) -> (Light, [f64; 3]) {
     (Light { name: "light".to_owned(), kind }, inputs.at("color").three())
 }
 
+/// A light's effect, by its name.
+pub(crate) fn known(name: &str, kind: LightKind) -> Effect {
+    // A light's rules name effects of the library's own files.
+    library::register_all();
+    Light { name: name.to_owned(), kind }.effect().unwrap()
+}
+
+pub(crate) const LAMP: Lamp = Lamp { position: DVec3::ZERO, intensity: [1.0; 3], range: None, radius: 0.0 };
+
+pub(crate) fn beam(name: &str) -> Effect {
+    let beam = Beam { direction: DVec3::NEG_Z, irradiance: [1.0; 3], angular_diameter_degrees: 0.0 };
+    known(name, LightKind::Directional(beam))
+}
+
 /// Every case of the oracle's lights.
 pub(crate) fn light_vector(file: &Node<'_>) {
     let tolerance = file.vector.tolerances().double;
@@ -66,7 +81,7 @@ pub(crate) fn light_vector(file: &Node<'_>) {
         want.at("case").assert_text(case.at("case").text());
         let (light, color) = light_of(&case.at("light"));
         let [x, n] = ["x", "n"].map(|key| DVec3::from_array(case.at(key).three()));
-        // What samples hold of it (the rules over them are held against the same cases elsewhere).
+        // What samples hold of it; the rules over them are held against the same cases in `light_vectors`.
         let facing = light.attenuation(x) * n.dot(light.towards(x)).max(0.0);
         let by_color = light.strength().map(|strength| strength * facing);
         let irradiance: [f64; 3] = std::array::from_fn(|c| color[c] * by_color[c]);

@@ -41,6 +41,7 @@ mod instructions;
 mod joint;
 mod lenient;
 mod light_files;
+mod light_vectors;
 mod lights;
 mod lit;
 mod lobe;

@@ -5,7 +5,6 @@ use skinfit::engine::levels::{LevelMaker, Number as LevelNumber};
 use skinfit::model::evaluate::Setup;
 use skinfit::model::params::{Param, Params};
 use skinfit::samples::ViewSamples;
-use skinfit::shader::rule::rules;
 use skinfit::shader::tangent::chain::Seed;
 use skinfit_core::program::graph::Input;
 use skinfit_core::program::levels::LevelProgram;
@@ -133,8 +132,7 @@ impl Rules {
 
     /// One of the rules alone, a vector of what its arguments make.
     pub(super) fn rule(&self, name: &str, arguments: &[&[f64]]) -> [f64; 3] {
-        let rule = rules(self.setup.effects).find(|rule| rule.function == name).unwrap();
         let widths: Vec<usize> = arguments.iter().map(|argument| argument.len()).collect();
-        Function::new(&[rule.body], name, &widths).of(0.0, arguments).try_into().unwrap()
+        Function::of_rule(self.setup.effects, name, &widths).of(0.0, arguments).try_into().unwrap()
     }
 }

@@ -13,16 +13,15 @@ use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
 use skinfit::model::evaluate::Setup;
 use skinfit::model::params::Params;
 use skinfit::model::transmission::FARTHEST;
-use skinfit::scene::light::{Beam, Cone, Lamp};
+use skinfit::scene::light::Cone;
 use skinfit::scene::{Light, LightKind};
 use skinfit::shader::probe::Probe;
-use skinfit::shader::term::library;
 use skinfit::shader::{Domain, Facts};
 
 use super::bench;
 use crate::common::vectors_light;
 use crate::fixtures::bare_scene;
-use crate::lights::light_of;
+use crate::lights::{LAMP, beam, known, light_of};
 use crate::lit::param;
 use crate::sky::effect;
 use crate::vectors::reader::{Node, Tolerance, Vectors};
@@ -78,20 +77,6 @@ fn single(file: &Node<'_>, case: &Node<'_>) -> Tolerance {
 
 fn read() -> Vectors {
     Vectors::read(&vectors_light())
-}
-
-/// Lights of each kind, by the names of their effects.
-fn known(name: &str, kind: LightKind) -> Effect {
-    // A light's rules name effects of the library's own files.
-    library::register_all();
-    Light { name: name.to_owned(), kind }.effect().unwrap()
-}
-
-const LAMP: Lamp = Lamp { position: DVec3::ZERO, intensity: [1.0; 3], range: None, radius: 0.0 };
-
-fn beam(name: &str) -> Effect {
-    let beam = Beam { direction: DVec3::NEG_Z, irradiance: [1.0; 3], angular_diameter_degrees: 0.0 };
-    known(name, LightKind::Directional(beam))
 }
 
 /// The parameters that a light's numbers are, as a scene's light has them.
