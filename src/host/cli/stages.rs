@@ -232,6 +232,7 @@ mod tests {
 
     #[test]
     fn captions_tell_lengths_in_millimetres() {
+        skinfit_core::shader::term::library::register_all();
         let mut params = Params::defaults(Form::Corrected);
         let radii = [("diffusion_unit", 50.0), ("diffusion_radius_1", 3.0), ("diffusion_radius_2", 4.0)];
         for (name, value) in radii {
