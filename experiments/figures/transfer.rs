@@ -77,7 +77,10 @@ impl Seen<'_> {
     fn by_targets(&self, loaded: Loaded) -> Result<(Vec<Vec<f32>>, f64)> {
         let baked = loaded.bake()?;
         let frames = self.frames(|frame| self.by(frame, baked.sky.as_deref()))?;
-        let rows = baked.stats.rows.iter().filter(|row| row.name == "transfer");
-        Ok((frames, rows.map(|row| row.seconds).sum::<f64>() / self.clip.poses.len() as f64))
+        let rows: Vec<_> = baked.stats.rows.iter().filter(|row| row.name == "transfer").collect();
+        if rows.is_empty() {
+            return Err("no bake is called transfer".into());
+        }
+        Ok((frames, rows.iter().map(|row| row.seconds).sum::<f64>() / self.clip.poses.len() as f64))
     }
 }

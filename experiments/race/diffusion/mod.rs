@@ -59,7 +59,8 @@ fn point(values: &[f64]) -> Result<Point> {
     Ok(Point { params: data::params(values)?, gains: vec![1.0.into()] })
 }
 
-/// Points so near one another that nothing changes but what is kept: no pass may find what the one before has left.
+/// Points so near one another that nothing changes but what is kept: no pass may find what the one before has left. In 32
+/// bits they differ, too.
 struct Points {
     values: Vec<f64>,
     turn: Cell<u32>,
@@ -68,7 +69,7 @@ struct Points {
 impl Points {
     fn next(&self) -> Result<Point> {
         self.turn.set(self.turn.get() + 1);
-        let near = 1.0 + 1e-12 * f64::from(self.turn.get());
+        let near = 1.0 + 1e-6 * f64::from(self.turn.get());
         point(&self.values.iter().map(|value| value * near).collect::<Vec<_>>())
     }
 }

@@ -150,8 +150,8 @@ impl Search {
     /// The rows of full sums over these variables; a sum of none of them holds nothing.
     fn full_rows(&self, free: &[usize]) -> Option<DMatrix<f64>> {
         let full: Vec<usize> = (0..self.full.len()).filter(|&s| self.full[s]).collect();
-        let rows = DMatrix::from_fn(full.len(), free.len(), |s, a| self.rows[full[s]][free[a]]);
-        (!full.is_empty()).then_some(rows)
+        (!full.is_empty())
+            .then(|| DMatrix::from_fn(full.len(), free.len(), |s, a| self.rows[full[s]][free[a]]))
     }
 
     /// Go to the optimum over the free variables, or to the first bound on the way to it; whether
@@ -211,38 +211,29 @@ impl Search {
 
     /// Free what costs most of the bounds and sums that hold; whether there is any.
     fn release_one(&mut self) -> bool {
-        let k = self.place.len();
         let mut slope = &self.gradient + &self.hessian * &self.z;
-        let mut size = DVector::from_fn(k, |i, _| {
-            self.gradient[i].abs() + self.hessian.row(i).transpose().component_mul(&self.z).abs().sum()
-        });
         let mut worst = None;
         let mut cost = 0.0;
-        // What full sums push back by: of least squares where they depend on each other.
-        let free = self.free();
-        if let Some(rows) = self.full_rows(&free) {
-            let of_free = DVector::from_fn(free.len(), |a, _| -slope[free[a]]);
-            let push = solve_least_norm(&rows * rows.transpose(), &(&rows * of_free));
-            let full: Vec<usize> = (0..self.full.len()).filter(|&s| self.full[s]).collect();
-            for (&sum, &push) in full.iter().zip(&push) {
-                let row = &self.rows[sum];
-                let norm = row.norm();
-                let rounding = MULTIPLIER_ROUNDING * row.component_mul(&size).sum() / norm;
-                if -push * norm > rounding && -push * norm > cost {
-                    (cost, worst) = (-push * norm, Some(Hold::Sum(sum)));
-                }
-                slope += push * row;
-                size += push.abs() * row;
+        let pushes = self.pushes(&slope);
+        for &(sum, push) in &pushes {
+            let row = &self.rows[sum];
+            let norm = row.norm();
+            let terms = (0..row.len()).filter(|&i| row[i] != 0.0).map(|i| row[i] * self.size(i));
+            let rounding = MULTIPLIER_ROUNDING * terms.sum::<f64>() / norm;
+            if -push * norm > rounding.max(cost) {
+                (cost, worst) = (-push * norm, Some(Hold::Sum(sum)));
             }
+            slope.axpy(push, row, 1.0);
         }
-        for i in 0..k {
+        for i in 0..self.place.len() {
             let inward = match self.place[i] {
                 Place::Lower => -1.0,
                 Place::Upper => 1.0,
                 Place::Free | Place::Fixed => continue,
             };
             let multiplier = inward * slope[i];
-            if multiplier > MULTIPLIER_ROUNDING * size[i] && multiplier > cost {
+            let pushed: f64 = pushes.iter().map(|&(sum, push)| push.abs() * self.rows[sum][i]).sum();
+            if multiplier > cost && multiplier > MULTIPLIER_ROUNDING * (self.size(i) + pushed) {
                 (cost, worst) = (multiplier, Some(Hold::Bound(i, self.place[i])));
             }
         }
@@ -252,6 +243,22 @@ impl Search {
             None => return false,
         }
         true
+    }
+
+    /// What full sums push back by where this is the slope: of least squares where they depend on each other.
+    fn pushes(&self, slope: &DVector<f64>) -> Vec<(usize, f64)> {
+        let free = self.free();
+        let Some(rows) = self.full_rows(&free) else { return Vec::new() };
+        let of_free = DVector::from_fn(free.len(), |a, _| -slope[free[a]]);
+        let pushes = solve_least_norm(&rows * rows.transpose(), &(&rows * of_free));
+        let full = (0..self.full.len()).filter(|&sum| self.full[sum]);
+        full.zip(pushes.iter().copied()).collect()
+    }
+
+    /// The terms that a slope is the sum of, whatever their signs.
+    fn size(&self, i: usize) -> f64 {
+        let terms = self.hessian.row(i).iter().zip(&self.z).map(|(h, z)| (h * z).abs()).sum::<f64>();
+        self.gradient[i].abs() + terms
     }
 
     fn step(&self, room: &Room) -> Vec<f64> {

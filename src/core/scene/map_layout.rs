@@ -13,6 +13,9 @@ use super::plain::Wrap;
 
 /// The largest side that every adapter takes (WebGPU, section 3.6.2: `maxTextureDimension2D`).
 pub(super) const MOST_TEXELS: usize = 8192;
+/// As many texels of all maps as four of the greatest sides that are usual have, 4096; of maps that have more, twice what they
+/// have. A small file is not to take all memory.
+pub(super) const MOST_OF_ALL: usize = 1 << 26;
 /// From here on the numbers of an f32 are further apart than pictures.
 const FARTHEST: f64 = 16_777_216.0;
 
@@ -52,7 +55,17 @@ impl MapLayout {
             Span::over(&sides, [least[axis], most[axis]])
         };
         let layout = Self([along(0)?, along(1)?]);
+        if layout.texels(&sides) > MOST_OF_ALL.max(sides.iter().map(|([u, v], _)| u * v).sum::<usize>() * 2) {
+            return Err(TooFar);
+        }
         Ok((layout != Self([Span::WHOLE; 2])).then_some(layout))
+    }
+
+    /// Texels of all maps, laid out.
+    fn texels(self, sides: &[([usize; 2], [Wrap; 2])]) -> usize {
+        let Self([u, v]) = self;
+        let along = |span: Span, side: usize| if side == 1 { 1 } else { side / span.of_map * span.cells };
+        sides.iter().map(|([width, height], _)| along(u, *width) * along(v, *height)).sum()
     }
 
     /// Lay the maps out.
@@ -247,6 +260,23 @@ mod tests {
         // With its margin, 8190 texels are the most.
         assert!(over(&[(8190, Wrap::Clamp)], [0.0, 1.0]).is_ok());
         assert_eq!(over(&[(8191, Wrap::Clamp)], [0.0, 1.0]), Err(TooFar));
+    }
+
+    #[test]
+    fn small_maps_that_would_take_much_memory_are_refused() {
+        let map = || Some(Map { width: 2, height: 2, texels: vec![[0.0; 3]; 4] });
+        let maps = Maps { color: map(), ..Maps::default() };
+        let clamped = [Wrap::Clamp; 2];
+        let wraps = Wraps { color: clamped, normal: clamped };
+        let over = |most: f32| {
+            let mesh = Mesh {
+                uvs: vec![Vec2::ZERO, Vec2::splat(most), Vec2::X],
+                triangles: vec![[0, 1, 2]],
+                ..Mesh::default()
+            };
+            MapLayout::of(&maps, &wraps, &mesh).map(|layout| layout.is_some())
+        };
+        assert_eq!([over(1000.0), over(4050.0)], [Ok(true), Err(TooFar)]);
     }
 
     #[test]

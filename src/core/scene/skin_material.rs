@@ -5,7 +5,7 @@ use super::error::{SceneError, Warnings, warn};
 use super::file::{SceneFile, Source};
 use super::gltf::{Document, SkinMaps, TextureUv};
 use super::map_files::normal_flip;
-use super::map_layout::{MOST_TEXELS, MapLayout, TooFar, Wraps};
+use super::map_layout::{MOST_OF_ALL, MOST_TEXELS, MapLayout, TooFar, Wraps};
 use super::maps::Maps;
 use super::mesh::Mesh;
 use super::plain::Wrap;
@@ -75,10 +75,10 @@ impl SkinMaterial {
             Err(TooFar) => {
                 let name = &self.of.material;
                 let message = format!(
-                    "material {name:?}: the skin's texture coordinates go too far beyond pictures that its material mirrors or \
-                     clamps: laid out for that, the maps would have more than {MOST_TEXELS} texels along a side. They repeat there \
-                     instead. Bring the texture coordinates within the pictures, or take smaller maps, whose sides divide one \
-                     another"
+                    "material {name:?}: the skin comes to borders of pictures that its material mirrors or clamps, and what lies \
+                     beyond cannot be laid out: the maps would have more than {MOST_TEXELS} texels along a side, or {MOST_OF_ALL} \
+                     in all. They repeat there instead. Keep the texture coordinates half a texel within the pictures, or take \
+                     smaller maps, whose sides divide one another"
                 );
                 warn(warnings, document.path(), message);
             }
