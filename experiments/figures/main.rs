@@ -82,6 +82,7 @@ const FILES: &[(&str, Measure)] = &[
     ("experiments/network/results.json", timings::network),
     ("experiments/race/results.json", race::processor),
     ("experiments/race/diffusion.json", race::diffusion),
+    ("experiments/race/diffusion_card.json", race::diffusion_on_a_card),
     ("experiments/race/card.json", race::graphics_card),
     ("experiments/race/h200.json", race::earlier),
 ];

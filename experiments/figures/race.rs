@@ -54,6 +54,12 @@ pub(crate) fn diffusion(lab: &Lab) -> Result<Value> {
     Ok(json!({ "rows": diffused(lab, &["--threads", "2"], "cpu")? }))
 }
 
+/// experiments/race: the same on a graphics card.
+pub(crate) fn diffusion_on_a_card(lab: &Lab) -> Result<Value> {
+    let rows = diffused(lab, &["--engine", "gpu", "--reps", "20"], "cuda")?;
+    Ok(json!({ "adapter": card(lab)?, "rows": rows }))
+}
+
 /// What the data of texture-space diffusion is called: texels a side, pixels.
 const DIFFUSED: &str = "512_442368";
 
@@ -114,9 +120,6 @@ pub(crate) fn graphics_card(lab: &Lab) -> Result<Value> {
     let folder = lab.race.as_ref().ok_or("name the folder of the race's data by --race")?;
     let runs = 3;
     let mut raw = json!({ "adapter": card(lab)? });
-    if folder.join("data").join(DIFFUSED).is_dir() {
-        raw["diffusion"] = diffused(lab, &["--engine", "gpu", "--reps", "20"], "cuda")?.into();
-    }
     for (pixels, options) in [
         ("1048576", &["--engine", "gpu", "--reps", "20"][..]),
         ("16777216", &["--engine", "gpu", "--reps", "20", "--passes-only"]),
