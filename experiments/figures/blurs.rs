@@ -14,16 +14,14 @@ use crate::squares::{Shown, coloured, cut, laid_out, read, toned};
 const SCENE: &str = "studio";
 const VIEW: &str = "front";
 
-/// What the others are measured against. Levels are added up in texels, so that what pixels look up is a picture of the atlas.
-const SURFACE: Choice = ("surface", &[("diffusion", "{ combined = \"map\", method = \"surface\" }")]);
+/// What the others are measured against.
+const SURFACE: Choice = ("surface", &[("diffusion", "{ method = \"surface\" }")]);
 const CHOICES: [Choice; 4] = [
-    ("as the scene has it", &[("diffusion", "{ combined = \"map\" }")]),
-    ("`taps = \"full\"`", &[("diffusion", "{ combined = \"map\", taps = \"full\" }")]),
-    ("`seams = \"joined\"`", &[("diffusion", "{ combined = \"map\", seams = \"joined\" }")]),
-    ("`light_map_size = 256`", &[("diffusion", "{ combined = \"map\", light_map_size = 256 }")]),
+    ("as the scene has it", &[]),
+    ("`taps = \"full\"`", &[("diffusion", "{ taps = \"full\" }")]),
+    ("`seams = \"joined\"`", &[("diffusion", "{ seams = \"joined\" }")]),
+    ("`light_map_size = 256`", &[("diffusion", "{ light_map_size = 256 }")]),
 ];
-/// Nothing is free that moves a level, so that stages are not made of how levels move.
-const HELD: [(&str, &str); 2] = [("fit.free", "[\"rim_weight\"]"), ("fit.per_channel", "[\"rim_weight\"]")];
 
 /// What the picture shows of the view, by left, top and side: the head, and eyes to mouth.
 const SQUARES: [[u32; 3]; 2] = [[66, 36, 246], [118, 136, 130]];
@@ -41,37 +39,27 @@ const MOST: f64 = 5.0;
 /// Pixels at the foot of each square in which the scale stands, from 0 on the left to [`MOST`].
 const SCALE: u32 = 8;
 
-/// What a choice makes: the view, and what pixels look up in the atlas.
-struct Made {
-    view: Shown,
-    atlas: Shown,
-}
-
-/// What a choice makes, and the reference of it.
+/// What a choice makes of the view, and the reference of it.
 type Pair<'a> = (&'a Shown, &'a Shown);
 
-/// A row a choice: how far its view is off, whole and by parts, and its atlas, in percent.
+/// A row a choice: how far its view is off, whole and by parts, in percent.
 pub(crate) fn measure(lab: &Lab) -> Result<Value> {
     let (_, run) = lab.fit(SCENE, Some(&lab.head_scene(SCENE, "full.toml")), &[])?;
     let params = run.join("params.toml");
     let surface = made(lab, SURFACE, &params)?;
-    let mut columns = vec![squares(&toned(&surface.view), Some(&toned(&surface.atlas)))];
+    let mut columns = vec![squares(&toned(&surface))];
     let mut rows = Vec::new();
     for choice in CHOICES {
         let found = made(lab, choice, &params)?;
-        let view = (&found.view, &surface.view);
-        // A texel of an atlas of another size is another place.
-        let same = found.atlas.pixels.len() == surface.atlas.pixels.len();
-        let atlas = same.then_some((&found.atlas, &surface.atlas));
-        rows.push(row(choice.0, view, atlas));
-        let heats = squares(&heat(view), atlas.map(heat).as_ref());
-        columns.push(heats.into_iter().map(with_scale).collect());
+        let view = (&found, &surface);
+        rows.push(row(choice.0, view));
+        columns.push(squares(&heat(view)).into_iter().map(with_scale).collect());
     }
     laid_out(&columns, "docs/images/blurs.png")?;
     Ok(json!({ "most": MOST, "rows": rows }))
 }
 
-fn row(name: &str, view: Pair<'_>, atlas: Option<Pair<'_>>) -> Value {
+fn row(name: &str, view: Pair<'_>) -> Value {
     let part = |(name, places): (&str, &[[usize; 4]])| {
         let off = percent(view, |x, y| places.iter().any(|place| holds(*place, x, y)));
         (name.to_owned(), off.into())
@@ -80,23 +68,17 @@ fn row(name: &str, view: Pair<'_>, atlas: Option<Pair<'_>>) -> Value {
         "name": name,
         "view": percent(view, |_, _| true),
         "parts": PARTS.into_iter().map(part).collect::<Map<String, Value>>(),
-        "atlas": atlas.map(|atlas| percent(atlas, |_, _| true)),
     })
 }
 
-/// What a choice makes at the constants of a fit.
-fn made(lab: &Lab, (name, settings): Choice, params: &Path) -> Result<Made> {
-    let scene = lab.scene(name, &lab.head_scene(SCENE, "full.toml"), &[settings, &HELD].concat())?;
-    let (image, baked) = (scene.with_extension("exr"), scene.with_extension("baked"));
-    let run = |command: &str, options: &[&str], output: &Path| {
-        let [scene, params, output] =
-            [scene.as_path(), params, output].map(|path| path.display().to_string());
-        let arguments = [&[command, &scene, "--params", &params, "-o", &output], options].concat();
-        lab.skinfit(&format!("{command}, {name}"), &arguments, false)
-    };
-    run("render", &["--view", VIEW, "--engine", "cpu"], &image)?;
-    run("bake", &["--stages"], &baked)?;
-    Ok(Made { view: read(&image)?, atlas: read(&baked.join("sum.exr"))? })
+/// What a choice makes of the view at the constants of a fit.
+fn made(lab: &Lab, (name, settings): Choice, params: &Path) -> Result<Shown> {
+    let scene = lab.scene(name, &lab.head_scene(SCENE, "full.toml"), settings)?;
+    let image = scene.with_extension("exr");
+    let [scene, params, output] = [&scene, params, &image].map(|path| path.display().to_string());
+    let arguments = ["render", &scene, "--params", &params, "--view", VIEW, "--engine", "cpu", "-o", &output];
+    lab.skinfit(&format!("render, {name}"), &arguments, false)?;
+    read(&image)
 }
 
 /// Whether a pixel lies in left, top, width and height.
@@ -130,10 +112,9 @@ fn heat((found, reference): Pair<'_>) -> RgbImage {
     coloured(reference, |i| magma((difference(found.pixels[i], reference.pixels[i]).sqrt() / most) as f32))
 }
 
-/// The squares of the view, and all of the atlas.
-fn squares(view: &RgbImage, atlas: Option<&RgbImage>) -> Vec<RgbImage> {
-    let whole = atlas.map(|atlas| cut(atlas, [0, 0, atlas.width()]));
-    SQUARES.into_iter().map(|square| cut(view, square)).chain(whole).collect()
+/// The squares of the view.
+fn squares(view: &RgbImage) -> Vec<RgbImage> {
+    SQUARES.into_iter().map(|square| cut(view, square)).collect()
 }
 
 /// A square with the colours from 0 to [`MOST`] at its foot.
