@@ -74,7 +74,8 @@ pub(super) fn projection(rows: &DMatrix<f64>) -> DMatrix<f64> {
     if rows.nrows() == 0 {
         return projection;
     }
-    let eigen = SymmetricEigen::new(rows * rows.transpose());
+    let (rows, _) = of_unit_length(rows);
+    let eigen = SymmetricEigen::new(&rows * rows.transpose());
     let threshold = NULL_EIGENVALUE * eigen.eigenvalues.max();
     for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
         if *value > threshold {
@@ -83,6 +84,14 @@ pub(super) fn projection(rows: &DMatrix<f64>) -> DMatrix<f64> {
         }
     }
     projection
+}
+
+/// Rows by their lengths, and these: rows of very different units hold alike. One of zeros stays, and counts as 1 long.
+fn of_unit_length(rows: &DMatrix<f64>) -> (DMatrix<f64>, Vec<f64>) {
+    let lengths: Vec<f64> = rows.row_iter().map(|row| row.norm()).collect();
+    let lengths: Vec<f64> =
+        lengths.into_iter().map(|length| if length > 0.0 { length } else { 1.0 }).collect();
+    (DMatrix::from_fn(rows.nrows(), rows.ncols(), |s, a| rows[(s, a)] / lengths[s]), lengths)
 }
 
 /// The problem in variables `z = scale * d`, for which H has a unit diagonal.
@@ -250,9 +259,10 @@ impl Search {
         let free = self.free();
         let Some(rows) = self.full_rows(&free) else { return Vec::new() };
         let of_free = DVector::from_fn(free.len(), |a, _| -slope[free[a]]);
+        let (rows, lengths) = of_unit_length(&rows);
         let pushes = solve_least_norm(&rows * rows.transpose(), &(&rows * of_free));
         let full = (0..self.full.len()).filter(|&sum| self.full[sum]);
-        full.zip(pushes.iter().copied()).collect()
+        full.zip(pushes.iter().zip(&lengths).map(|(push, length)| push / length)).collect()
     }
 
     /// The terms that a slope is the sum of, whatever their signs.

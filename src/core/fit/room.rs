@@ -43,14 +43,16 @@ impl Room {
         (self.down[i], self.up[i]) = (0.0, 0.0);
     }
 
-    /// The greatest part of a step that no sum forbids to each variable: a sum that would overflow is filled, its
-    /// variables' steps cut alike.
+    /// Shorten a step so that no sum overflows: what goes up goes up by less, all of a sum alike.
     pub(super) fn cut(&self, step: &mut [f64]) {
         for sum in &self.sums {
-            let total: f64 = sum.of.iter().map(|&i| step[i]).sum();
-            if total > sum.room {
-                let share = sum.room.max(0.0) / total;
-                sum.of.iter().for_each(|&i| step[i] *= share);
+            let over = sum.of.iter().map(|&i| step[i]).sum::<f64>() - sum.room.max(0.0);
+            if over > 0.0 {
+                let up: f64 = sum.of.iter().map(|&i| step[i].max(0.0)).sum();
+                let share = (1.0 - over / up).max(0.0);
+                for &i in &sum.of {
+                    step[i] *= if step[i] > 0.0 { share } else { 1.0 };
+                }
             }
         }
     }
@@ -80,7 +82,11 @@ mod tests {
         };
         assert_eq!(cut([0.25, 0.25, 9.0]), [0.25, 0.25, 9.0]);
         assert_eq!(cut([1.0, 1.0, 9.0]), [0.25, 0.25, 9.0]);
-        // What one gives, another may take.
+        // What one gives, another may take; and along a full sum no more than a rounding is taken off.
         assert_eq!(cut([2.0, -1.75, 9.0]), [2.0, -1.75, 9.0]);
+        let full = Room { sums: vec![Sum { of: vec![0, 1], room: 0.0 }], ..Room::default() };
+        let mut along = [0.3, -0.3 + 1e-16];
+        full.cut(&mut along);
+        assert!((along[0] - 0.3).abs() < 1e-15 && along[1] == -0.3 + 1e-16, "{along:?}");
     }
 }
