@@ -107,12 +107,14 @@ impl Coordinates {
         self.shares.iter().filter(full).map(|(of, _)| of.as_slice())
     }
 
-    /// Shares that add up to more than they may, lowered alike; the others as they are.
+    /// Shares that add up to more than they may, what they are above their least values lowered alike; the others as they are.
     pub(super) fn share_out(&self, at: &mut [f64]) {
         for (of, most) in &self.shares {
             let total = total(of, at);
             if total > *most {
-                of.iter().for_each(|&i| at[i] = (at[i] * most / total).max(self.lower[i]));
+                let least = self::total(of, &self.lower);
+                let share = (most - least) / (total - least);
+                of.iter().for_each(|&i| at[i] = self.lower[i] + share * (at[i] - self.lower[i]));
             }
         }
     }
@@ -124,14 +126,19 @@ impl Coordinates {
             let before: Vec<f64> = of.iter().map(|&i| after[i]).collect();
             let total = total(of, &after);
             if total > *most {
-                of.iter().for_each(|&i| after[i] *= most / total);
+                let least = self::total(of, &self.lower);
+                let share = (most - least) / (total - least);
+                of.iter().for_each(|&i| after[i] = self.lower[i] + share * (after[i] - self.lower[i]));
             }
             befores.push((before, total));
         }
         for ((of, most), (before, total)) in self.shares.iter().zip(befores).rev() {
             if total > *most {
-                let along: f64 = of.iter().zip(&before).map(|(&i, x)| gradient[i] * x).sum();
-                of.iter().for_each(|&i| gradient[i] = (gradient[i] - along / total) * most / total);
+                let least = self::total(of, &self.lower);
+                let share = (most - least) / (total - least);
+                let above = of.iter().zip(&before).map(|(&i, x)| gradient[i] * (x - self.lower[i]));
+                let along = above.sum::<f64>() / (total - least);
+                of.iter().for_each(|&i| gradient[i] = share * (gradient[i] - along));
             }
         }
     }
