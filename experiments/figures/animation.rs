@@ -11,13 +11,16 @@ use skinfit::bake::occlusion::bake_occlusion;
 use skinfit::prepare::Loaded;
 use skinfit::scene::mesh::PosedMesh;
 
-use crate::clip::{Clip, FPS, RATES, head};
+use crate::clip::{Clip, FPS, RATES, head, seconds_of};
 use crate::flicker::{Apart, Pieces, Way, plot};
 use crate::lab::{Lab, Result};
 use crate::transfer;
 
 /// Rays a vertex of the bake that tells noise from change; a scene has 256 unless it says more.
 const MANY: u32 = 4096;
+
+/// What the bake is called.
+const OCCLUSION: &str = "occlusion";
 
 /// Occlusion, and beside it transfer.
 pub(crate) fn measure(lab: &Lab) -> Result<Value> {
@@ -33,10 +36,10 @@ fn occlusion(lab: &Lab) -> Result<Value> {
     let mut scene = loaded.scene.clone();
     let clip = Clip::of(&scene)?;
     let rays = scene.quality.occlusion_rays;
-    let (bakes, seconds) = clip.baked(&scene);
+    let (bakes, seconds) = clip.baked(&scene, OCCLUSION)?;
     let each = of_each(&clip, &bakes)?;
     scene.quality.occlusion_rays = MANY;
-    let (fine, fine_seconds) = clip.baked(&scene);
+    let (fine, fine_seconds) = clip.baked(&scene, OCCLUSION)?;
     let fine = of_each(&clip, &fine)?;
     let drawn_anew = drawn_anew(&clip, rays);
     // Seconds of so many bakes, by the frame.
@@ -90,6 +93,5 @@ fn by_targets(clip: &Clip, loaded: Loaded) -> Result<(Vec<Vec<f32>>, f64)> {
     let baked = loaded.bake()?;
     let occlusion = baked.occlusion.as_ref().ok_or("no occlusion was baked")?;
     let frames = clip.weights.iter().map(|weights| clip.of_skin(&occlusion.posed(weights), 1)).collect();
-    let rows = baked.stats.rows.iter().filter(|row| row.name == "occlusion");
-    Ok((frames, rows.map(|row| row.seconds).sum::<f64>() / clip.poses.len() as f64))
+    Ok((frames, seconds_of(&baked.stats, OCCLUSION)? / clip.poses.len() as f64))
 }

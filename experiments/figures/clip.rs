@@ -1,6 +1,6 @@
 //! A head that nods and grimaces, frame by frame of its clip, and what is baked of the frames.
 
-use skinfit::bake::{PoseBake, bake_pose};
+use skinfit::bake::{BakeStats, PoseBake, bake_pose};
 use skinfit::prepare::{ClipOcclusion, Loaded, PrepareOptions};
 use skinfit::scene::Scene;
 use skinfit::scene::animation::Animation;
@@ -49,6 +49,19 @@ pub(crate) fn head(lab: &Lab, effect: &str) -> Result<Loaded> {
     Ok(Loaded::read(&path, &PrepareOptions { time: Some(0.0), clip, ..PrepareOptions::default() })?)
 }
 
+/// Seconds that bakes of that name took.
+///
+/// # Errors
+/// When there is none.
+pub(crate) fn seconds_of(stats: &BakeStats, name: &str) -> Result<f64> {
+    let seconds: Vec<f64> = stats.rows.iter().filter(|row| row.name == name).map(|row| row.seconds).collect();
+    if seconds.is_empty() {
+        Err(format!("no bake is called {name}").into())
+    } else {
+        Ok(seconds.iter().sum())
+    }
+}
+
 /// A clip, frame by frame.
 pub(crate) struct Clip {
     /// Seconds.
@@ -82,17 +95,18 @@ impl Clip {
         Ok(Self { length, weights: meshes.iter().map(weights).collect(), poses, skin })
     }
 
-    /// Each frame's own bake, as `render --occlusion frames` makes it, and the mean seconds of one.
-    pub(crate) fn baked(&self, scene: &Scene) -> (Vec<PoseBake>, f64) {
+    /// Each frame's own bake, as `render --occlusion frames` makes it, and the mean seconds that what is called `name` takes
+    /// of one.
+    pub(crate) fn baked(&self, scene: &Scene, name: &str) -> Result<(Vec<PoseBake>, f64)> {
         let (mut bakes, mut seconds, mut light) = (Vec::new(), 0.0, None);
         for pose in &self.poses {
             let (bake, stats) = bake_pose(scene, pose, light.as_ref(), None);
-            seconds += stats.seconds();
+            seconds += seconds_of(&stats, name)?;
             // The same for all frames.
             light = light.or_else(|| bake.sky.as_ref()?.light.clone());
             bakes.push(bake);
         }
-        (bakes, seconds / self.poses.len() as f64)
+        Ok((bakes, seconds / self.poses.len() as f64))
     }
 
     /// How many poses are baked at so many a second.

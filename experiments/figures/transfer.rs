@@ -13,9 +13,12 @@ use skinfit::samples::{PosedSurface, SurfaceBakes};
 use skinfit::scene::Scene;
 use skinfit::scene::mesh::Morph;
 
-use crate::clip::{Clip, FPS, RATES, head};
+use crate::clip::{Clip, FPS, RATES, head, seconds_of};
 use crate::flicker::Apart;
 use crate::lab::{Lab, Result};
+
+/// What the bake is called.
+const TRANSFER: &str = "transfer";
 
 /// A row for each way to follow the clip.
 pub(crate) fn measure(lab: &Lab) -> Result<Value> {
@@ -25,7 +28,7 @@ pub(crate) fn measure(lab: &Lab) -> Result<Value> {
     let field = scene.needs().fields.named(SKY_RATIO).ok_or("no effect asks for the sky")?;
     let rays = clip.poses.iter().map(RayMesh::of).collect();
     let seen = Seen { scene: &scene, clip: &clip, rays, field };
-    let (bakes, seconds) = clip.baked(&scene);
+    let (bakes, seconds) = clip.baked(&scene, TRANSFER)?;
     let each = seen.frames(|frame| seen.by(frame, bakes[frame].sky.as_ref()))?;
     // Seconds of so many bakes, by the frame.
     let of_poses = |count: usize| seconds * count as f64 / clip.poses.len() as f64;
@@ -77,10 +80,6 @@ impl Seen<'_> {
     fn by_targets(&self, loaded: Loaded) -> Result<(Vec<Vec<f32>>, f64)> {
         let baked = loaded.bake()?;
         let frames = self.frames(|frame| self.by(frame, baked.sky.as_deref()))?;
-        let rows: Vec<_> = baked.stats.rows.iter().filter(|row| row.name == "transfer").collect();
-        if rows.is_empty() {
-            return Err("no bake is called transfer".into());
-        }
-        Ok((frames, rows.iter().map(|row| row.seconds).sum::<f64>() / self.clip.poses.len() as f64))
+        Ok((frames, seconds_of(&baked.stats, TRANSFER)? / self.clip.poses.len() as f64))
     }
 }

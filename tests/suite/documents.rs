@@ -128,9 +128,15 @@ fn the_table_of_raw_files_has_every_one_that_is_measured() {
     let files: Vec<&str> = files.unwrap().0.split('"').skip(1).step_by(2).collect();
     assert!(files.len() > 20, "{files:?}");
     let rows: Vec<&str> = page.lines().filter(|line| line.starts_with("| `")).collect();
-    for file in files {
+    for file in &files {
         let named = rows.iter().any(|row| row.contains(&format!("`{file}`")));
         assert!(named, "experiments/figures/README.md has no row for {file}");
+    }
+    let cells = rows.iter().filter_map(|row| row.split('|').nth(1));
+    for name in
+        cells.flat_map(|cell| cell.split('`').skip(1).step_by(2)).filter(|name| name.ends_with(".json"))
+    {
+        assert!(files.contains(&name), "experiments/figures/README.md: nothing measures {name}");
     }
 }
 

@@ -166,7 +166,7 @@ fn outcome() -> Outcome {
         correlations,
         errors: ErrorBasis::Blocks(Blocks { alike: 12, side: 40, count: 80, next: 0.9 }),
         profile: Some(profile()),
-        full_shares: vec![],
+        full_shares: vec![vec!["diffusion_weight_1".to_owned(), "diffusion_weight_2".to_owned()]],
         undetermined: vec![
             Direction { components: vec![("reflection".to_owned(), 1.0)] },
             Direction { components: vec![("gain.1".to_owned(), 0.81), ("base_weight.r".to_owned(), -0.58)] },
@@ -278,6 +278,7 @@ fn the_json_holds_what_the_format_promises() {
     assert_eq!(number("/unknowns/3/noise_error"), 0.0156);
     assert_eq!((number("/profile/interval/1"), json["profile"]["closed"][1].as_bool()), (760.0, Some(false)));
     assert_eq!(json["undetermined"][1]["base_weight.r"], -0.58);
+    assert_eq!(json["full_shares"][0][1], "diffusion_weight_2");
     assert_eq!(json["history"].as_array().unwrap().len(), 7);
     assert_eq!(json["provenance"]["software"], concat!("skinfit ", env!("CARGO_PKG_VERSION")));
     assert_eq!(json["provenance"]["command"], "skinfit fit 'a <b>.toml' -o run");
@@ -340,6 +341,7 @@ fn what_is_wrong_is_told_with_its_place_in_words_and_numbers() {
             _ => "bad",
         }
     )));
+    assert!(page.contains("diffusion_weight_1 and diffusion_weight_2 leave nothing beside them"), "{page}");
     assert!(page.contains("The model explains ") && page.contains("Largest misfit: too dark at the rim by "));
 }
 

@@ -54,8 +54,10 @@ impl Secant {
         let hessian_of_step = if curved.clone().cholesky().is_some() { &curved } else { &hessian };
         let room = self.coordinates.room(&self.at);
         let step = bounded::minimise(hessian_of_step.as_slice(), gradient.as_slice(), &room);
-        self.at = self.coordinates.moved(&self.at, &step);
-        self.last = Some(Last { hessian, gradient, step: DVector::from_vec(step) });
+        let at = self.coordinates.moved(&self.at, &step);
+        let step = DVector::from_fn(k, |i, _| at[i] - self.at[i]);
+        self.last = Some(Last { hessian, gradient, step });
+        self.at = at;
         self.coordinates.point(&self.at)
     }
 }

@@ -107,40 +107,43 @@ impl Coordinates {
         self.shares.iter().filter(full).map(|(of, _)| of.as_slice())
     }
 
-    /// Shares that add up to more than they may, what they are above their least values lowered alike; the others as they are.
+    /// Shares that add up to more than they may, what they are above their least values lowered alike; the others as they
+    /// are.
     pub(super) fn share_out(&self, at: &mut [f64]) {
-        for (of, most) in &self.shares {
-            let total = total(of, at);
-            if total > *most {
-                let least = self::total(of, &self.lower);
-                let share = (most - least) / (total - least);
-                of.iter().for_each(|&i| at[i] = self.lower[i] + share * (at[i] - self.lower[i]));
-            }
+        for whole in &self.shares {
+            self.lower_shares(whole, at);
         }
     }
 
     /// The derivative of a loss by coordinates before [`share_out`](Self::share_out), from that by those after it.
     pub(super) fn share_out_pulled_back(&self, at: &[f64], gradient: &mut [f64]) {
-        let (mut after, mut befores) = (at.to_vec(), Vec::new());
-        for (of, most) in &self.shares {
-            let before: Vec<f64> = of.iter().map(|&i| after[i]).collect();
-            let total = total(of, &after);
-            if total > *most {
-                let least = self::total(of, &self.lower);
-                let share = (most - least) / (total - least);
-                of.iter().for_each(|&i| after[i] = self.lower[i] + share * (after[i] - self.lower[i]));
-            }
-            befores.push((before, total));
+        let mut after = at.to_vec();
+        let lowered: Vec<(Vec<f64>, f64)> = self
+            .shares
+            .iter()
+            .map(|whole| {
+                let above = whole.0.iter().map(|&i| after[i] - self.lower[i]).collect();
+                (above, self.lower_shares(whole, &mut after))
+            })
+            .collect();
+        for ((of, _), (above, share)) in
+            self.shares.iter().zip(lowered).rev().filter(|(_, (_, share))| *share < 1.0)
+        {
+            let along: f64 = of.iter().zip(&above).map(|(&i, x)| gradient[i] * x).sum();
+            let along = along / above.iter().sum::<f64>();
+            of.iter().for_each(|&i| gradient[i] = share * (gradient[i] - along));
         }
-        for ((of, most), (before, total)) in self.shares.iter().zip(befores).rev() {
-            if total > *most {
-                let least = self::total(of, &self.lower);
-                let share = (most - least) / (total - least);
-                let above = of.iter().zip(&before).map(|(&i, x)| gradient[i] * (x - self.lower[i]));
-                let along = above.sum::<f64>() / (total - least);
-                of.iter().for_each(|&i| gradient[i] = share * (gradient[i] - along));
-            }
+    }
+
+    /// Lower the shares of one whole where they are more than it; what is left of what is above their least values.
+    fn lower_shares(&self, (of, most): &(Vec<usize>, f64), at: &mut [f64]) -> f64 {
+        let (sum, least) = (total(of, at), total(of, &self.lower));
+        if sum <= *most {
+            return 1.0;
         }
+        let share = (most - least) / (sum - least);
+        of.iter().for_each(|&i| at[i] = self.lower[i] + share * (at[i] - self.lower[i]));
+        share
     }
 
     /// `at + step`, within the bounds, and on a bound to the bit where the step reaches it.
@@ -239,4 +242,67 @@ fn inward(unknown: &Unknown, value: f64) -> f64 {
 
 fn outward(unknown: &Unknown, at: f64) -> f64 {
     if is_log(unknown) { at.exp() } else { at }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::effects::Form;
+    use crate::model::params::{Channels, Column, Params};
+    use crate::shader::term::library;
+
+    /// Two weights that are tied over the channels and a third of red alone: two wholes that overlap; one weight is never
+    /// below a tenth.
+    fn overlapping() -> Coordinates {
+        library::register_all();
+        let weight = |k: usize| Param::from_name(&format!("diffusion_weight_{k}")).unwrap();
+        let column = |k, channels| Unknown::Param(Column { param: weight(k), channels });
+        let unknowns = [column(1, Channels::Tied), column(2, Channels::Tied), column(3, Channels::One(0))];
+        let mut params = Params::defaults(Form::Corrected);
+        (1..4).for_each(|k| params.set(weight(k), 0.2));
+        let mut bounds = Bounds::default();
+        bounds.set(weight(1), [0.1, 1.0]);
+        let limits = Limits { bounds: &[bounds], effects: None };
+        Coordinates::within(&unknowns, &Point { params, gains: vec![] }, limits)
+    }
+
+    #[test]
+    fn shares_keep_to_every_whole_and_to_their_bounds() {
+        let coordinates = overlapping();
+        for at in [[0.2, 0.3, 0.4], [0.9, 0.1, 0.8], [0.1, 1.0, 1.0], [1.0, 1.0, 0.0]] {
+            let mut shared = at;
+            coordinates.share_out(&mut shared);
+            let [a, b, c] = shared;
+            // Green and blue hold 0.2; a few roundings.
+            assert!(a + b <= 0.8 + 1e-15 && a + b + c <= 1.0 + 1e-15 && a >= 0.1, "{at:?}: {shared:?}");
+            assert_eq!(shared == at, at == [0.2, 0.3, 0.4], "{at:?}");
+        }
+    }
+
+    #[test]
+    fn the_slope_through_shares_is_that_of_differences() {
+        let coordinates = overlapping();
+        let loss = |at: [f64; 3]| {
+            let mut shared = at;
+            coordinates.share_out(&mut shared);
+            shared[0] * shared[0] + 2.0 * shared[1] - shared[1] * shared[2]
+        };
+        // None is full, the first whole, the second, both.
+        for at in [[0.2, 0.3, 0.4], [0.3, 0.3, 0.9], [0.6, 0.5, 0.05], [0.7, 0.9, 0.8]] {
+            let mut shared = at;
+            coordinates.share_out(&mut shared);
+            let mut slope = [2.0 * shared[0], 2.0 - shared[2], -shared[1]];
+            coordinates.share_out_pulled_back(&at, &mut slope);
+            for i in 0..3 {
+                let moved = |h: f64| {
+                    let mut moved = at;
+                    moved[i] += h;
+                    loss(moved)
+                };
+                // Central differences: h^2 of truncation, and 1e-16 / h of rounding.
+                let difference = (moved(1e-5) - moved(-1e-5)) / 2e-5;
+                assert!((slope[i] - difference).abs() < 1e-8, "{at:?}, {i}: {} {difference}", slope[i]);
+            }
+        }
+    }
 }

@@ -11,7 +11,7 @@
 //! - [`starts`]: where the other starts of a multi-start fit begin
 //! - [`statistics`]: standard errors and correlations; [`error_basis`]: what they rest on; [`sandwich`]: where
 //!   neighbouring residuals are alike; `null_space`: what is undetermined; [`profile`]: how far the loss lets an unknown go
-//! - [`outcome`]: what a fit yields
+//! - `held`: what bounds and full wholes hold of an answer; [`outcome`]: what a fit yields
 //! - [`params_file`]: what was fitted, as `params.toml`
 
 use std::sync::atomic::Ordering;
@@ -25,6 +25,7 @@ mod drive;
 mod error;
 pub mod error_basis;
 pub mod fingerprint;
+mod held;
 pub mod linearisation;
 pub mod lm;
 pub mod memory;
@@ -48,6 +49,7 @@ pub use options::{FitOptions, SolverKind, Tolerances};
 use coordinates::Coordinates;
 use drive::Log;
 use error_basis::ErrorBasis;
+use held::{at_bounds, full_shares};
 use linearisation::{Linearisation, Passes};
 use outcome::{Ending, Iteration, Outcome, StartOutcome, UnknownOutcome};
 use profile::{Answer, Profile};
@@ -55,9 +57,6 @@ use state::{Run, Saved};
 use statistics::Statistics;
 
 use crate::engine::{Objective, Point};
-
-/// Solvers that step through transforms never quite reach a bound.
-const AT_BOUND: f64 = 1e-6;
 
 /// Fit `objective` from `start`; `progress` is told each iteration of each start.
 ///
@@ -240,30 +239,6 @@ fn profile_of(
     let answer = Answer { model, errors: &errors, unit: &known.unit };
     let weakest = profile::weakest(coordinates, &answer)?;
     profile::profile(&Passes::new(objective, coordinates, 0), &answer, weakest, stop)
-}
-
-/// Which unknowns a bound holds, be it that shares beside it, all of them held, leave it no more.
-fn at_bounds(coordinates: &Coordinates, at: &[f64]) -> Vec<bool> {
-    let mut held: Vec<bool> = (0..at.len()).map(|i| is_at_bound(coordinates, i, at[i])).collect();
-    for of in coordinates.full(at) {
-        let mut free = of.iter().filter(|&&i| !held[i]);
-        if let (Some(&last), None) = (free.next(), free.next()) {
-            held[last] = true;
-        }
-    }
-    held
-}
-
-/// The full sums of shares, but for unknowns that are held by bounds.
-fn full_shares(coordinates: &Coordinates, at: &[f64], at_bound: &[bool]) -> Vec<Vec<String>> {
-    let name = |i: &usize| coordinates.unknowns()[*i].name();
-    let free = |of: &[usize]| of.iter().filter(|&&i| !at_bound[i]).map(name).collect::<Vec<_>>();
-    coordinates.full(at).map(free).filter(|names| names.len() > 1).collect()
-}
-
-fn is_at_bound(coordinates: &Coordinates, i: usize, at: f64) -> bool {
-    let near = AT_BOUND * coordinates.size(i, at);
-    at - coordinates.lower()[i] <= near || coordinates.upper()[i] - at <= near
 }
 
 fn sensitivity(coordinates: &Coordinates, origin: &Linearisation, i: usize) -> f64 {

@@ -61,6 +61,21 @@ mod tests {
     use crate::model::params::{Channels, Column, Param, Params};
 
     #[test]
+    fn shares_are_drawn_within_their_whole() {
+        crate::shader::term::library::register_all();
+        let weights = [1, 2, 3].map(|k| Param::from_name(&format!("diffusion_weight_{k}")).unwrap());
+        let unknowns = weights.map(|weight| Unknown::Param(Column::tied(weight)));
+        let mut origin = Point { params: Params::defaults(Form::Corrected), gains: vec![] };
+        weights.into_iter().for_each(|weight| origin.params.set(weight, 0.2));
+        let coordinates = Coordinates::new(&unknowns, &origin);
+        let totals: Vec<f64> =
+            (1..100).map(|index| draw(&coordinates, 3, index).iter().sum::<f64>()).collect();
+        // Three of [0, 1] add up to 1.5 in the mean: most are drawn beyond the whole.
+        assert!(totals.iter().all(|total| *total <= 1.0 + 1e-12), "{totals:?}");
+        assert!(totals.iter().filter(|total| **total > 1.0 - 1e-12).count() > 50);
+    }
+
+    #[test]
     fn starts_are_within_bounds_differ_and_depend_on_seed_and_index_alone() {
         let mut unknowns: Vec<Unknown> = Param::all().map(|p| Unknown::Param(Column::tied(p))).collect();
         unknowns.push(Unknown::Gain(0, Channels::Tied));

@@ -1,4 +1,5 @@
-//! Bounds for solvers that know none: each coordinate as a smooth function of a free variable.
+//! Bounds for solvers that know none: each coordinate as a smooth function of a free variable, and shares of a whole lowered
+//! together where they would add up to more.
 
 use super::coordinates::Coordinates;
 use super::linearisation::Linearisation;

@@ -55,11 +55,11 @@ impl Elimination {
         let room = coordinates.room(&model.at).of(&self.linear);
         let block = bounded::minimise(&hessian, &pick(&model.gradient), &room);
         let mut step = vec![0.0; model.len()];
-        let mut moved: f64 = 0.0;
-        for (&i, &d) in self.linear.iter().zip(&block) {
-            step[i] = d;
-            moved = moved.max(d.abs() / coordinates.size(i, model.at[i]));
-        }
-        Reduced { model: model.moved(&step, coordinates.moved(&model.at, &step)), moved }
+        self.linear.iter().zip(&block).for_each(|(&i, &d)| step[i] = d);
+        let at = coordinates.moved(&model.at, &step);
+        let step: Vec<f64> = at.iter().zip(&model.at).map(|(to, from)| to - from).collect();
+        let share = |&i: &usize| step[i].abs() / coordinates.size(i, model.at[i]);
+        let moved = self.linear.iter().map(share).fold(0.0, f64::max);
+        Reduced { model: model.moved(&step, at), moved }
     }
 }

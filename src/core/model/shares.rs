@@ -26,8 +26,7 @@ pub fn wholes(effects: Option<Effects>) -> Vec<(&'static str, Vec<Param>)> {
 pub fn overfull(params: &Params, effects: Effects) -> Vec<String> {
     let mut told = Vec::new();
     for (whole, shares) in wholes(Some(effects)) {
-        for (channel, name) in ["red", "green", "blue"].into_iter().enumerate() {
-            let total: f64 = shares.iter().map(|share| params.rgb(*share)[channel]).sum();
+        for (total, name) in totals(params, &shares).into_iter().zip(["red", "green", "blue"]) {
             if total > 1.0 + ROUNDING {
                 let names: Vec<&str> = shares.iter().map(|share| share.name()).collect();
                 told.push(format!(
@@ -38,6 +37,22 @@ pub fn overfull(params: &Params, effects: Effects) -> Vec<String> {
         }
     }
     told
+}
+
+/// Lower shares that add up to more than 1, those of a whole's channel alike.
+pub fn share_out(params: &mut Params, effects: Effects) {
+    for (_, shares) in wholes(Some(effects)) {
+        let total = totals(params, &shares);
+        for share in shares {
+            let rgb = params.rgb(share);
+            params.set_rgb(share, [0, 1, 2].map(|c| rgb[c] / total[c].max(1.0)));
+        }
+    }
+}
+
+/// What shares add up to in each channel.
+fn totals(params: &Params, shares: &[Param]) -> [f64; 3] {
+    [0, 1, 2].map(|c| shares.iter().map(|share| params.rgb(*share)[c]).sum())
 }
 
 #[cfg(test)]
@@ -67,5 +82,8 @@ mod tests {
         assert!(overfull(&params, three).is_empty(), "as many digits as add up to 1");
         params.set_rgb(first, [0.57, 0.0, 1.0]);
         assert!(overfull(&params, three)[0].contains("1.0100 in red"));
+        share_out(&mut params, three);
+        assert!(overfull(&params, three).is_empty());
+        assert_eq!(params.rgb(last), [0.0, 0.9, 0.0], "of an effect that is off");
     }
 }

@@ -58,10 +58,11 @@ impl Dilation {
     /// `None` where they are means.
     #[must_use]
     pub fn copies(&self) -> Option<Vec<(u32, u32)>> {
-        let mut copies: Vec<(u32, u32)> =
-            self.numbers.iter().map(|(&texel, &number)| (texel, number)).collect();
-        copies.sort_unstable();
-        self.ends.is_empty().then_some(copies)
+        self.ends.is_empty().then(|| {
+            let mut copies: Vec<_> = self.numbers.iter().map(|(&texel, &number)| (texel, number)).collect();
+            copies.sort_unstable();
+            copies
+        })
     }
 
     /// The number of a filled texel, by its place in the atlas, row by row.

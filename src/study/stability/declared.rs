@@ -24,6 +24,7 @@ use crate::model::effects::Effects;
 use crate::model::evaluate::Setup;
 use crate::model::fields::Field;
 use crate::model::params::{Param, Params};
+use crate::model::shares;
 use crate::model::terms::TermName;
 use crate::prepare::{PrepareError, PrepareOptions, Sampled};
 use crate::samples::{Atlas, ViewSamples};
@@ -87,27 +88,29 @@ impl Declared {
     /// How many batches [`search`] tries beside so many cases of the other search.
     #[must_use]
     pub fn batches(&self, cases: usize) -> usize {
-        self.hard().len() + lit::batches(cases)
+        1 + self.hard().len() + lit::batches(cases)
     }
 
-    /// The scene's values, and then one parameter after the other at its hard ones.
-    fn hard(&self) -> Vec<Params> {
-        let mut all = vec![self.params.clone()];
-        for param in parameters(self.setup.effects) {
-            for value in hard_values(param) {
-                let mut params = self.params.clone();
-                params.set(param, value);
-                all.push(params);
-            }
-        }
-        all
+    /// One parameter after the other at its hard values.
+    fn hard(&self) -> Vec<(Param, f64)> {
+        let of = |param: Param| hard_values(param).into_iter().map(move |value| (param, value));
+        parameters(self.setup.effects).into_iter().flat_map(of).collect()
     }
 
-    /// Batch `index` of a search: hard values first, random ones after them.
+    /// The parameters of batch `index`: the scene's, then one at a hard value, then random ones.
+    fn params(&self, index: usize, rng: &mut StdRng) -> Params {
+        let Some(at) = index.checked_sub(1) else { return self.params.clone() };
+        let Some(&(param, value)) = self.hard().get(at) else { return self.random(rng) };
+        let mut params = self.params.clone();
+        params.set(param, value);
+        params
+    }
+
+    /// Batch `index` of a search.
     fn batch(&self, seed: u64, index: usize) -> LitBatch {
         let mut rng =
             StdRng::seed_from_u64(seed ^ 0xdec ^ (index as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15));
-        let params = self.hard().into_iter().nth(index).unwrap_or_else(|| self.random(&mut rng));
+        let params = self.params(index, &mut rng);
         let effects = self.setup.effects;
         let fragments = if index == 0 { self.hard_surfaces(&mut rng) } else { self.drawn(&mut rng) };
         LitBatch {
@@ -154,6 +157,7 @@ impl Declared {
             let rgb = if param.info().rgb { [draw(), draw(), draw()] } else { [draw(); 3] };
             params.set_rgb(param, rgb);
         }
+        shares::share_out(&mut params, self.setup.effects);
         params
     }
 

@@ -42,6 +42,7 @@ pub mod error;
 pub mod library;
 mod map;
 mod needs;
+mod parameter;
 mod texels;
 mod there;
 mod wgsl;
