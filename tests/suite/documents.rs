@@ -132,11 +132,15 @@ fn the_table_of_raw_files_has_every_one_that_is_measured() {
         let named = rows.iter().any(|row| row.contains(&format!("`{file}`")));
         assert!(named, "experiments/figures/README.md has no row for {file}");
     }
-    let cells = rows.iter().filter_map(|row| row.split('|').nth(1));
-    for name in
-        cells.flat_map(|cell| cell.split('`').skip(1).step_by(2)).filter(|name| name.ends_with(".json"))
-    {
-        assert!(files.contains(&name), "experiments/figures/README.md: nothing measures {name}");
+    let ticked = |cell: &str| cell.split('`').skip(1).step_by(2).map(str::to_owned).collect::<Vec<_>>();
+    for row in &rows {
+        let cells: Vec<&str> = row.split('|').collect();
+        // Some have a script of their own, as they need what only a Python has.
+        let script = ticked(cells[2]).iter().any(|made_by| root().join(made_by).is_file());
+        for name in ticked(cells[1]).iter().filter(|name| name.ends_with(".json")) {
+            let measured = script || files.contains(&name.as_str());
+            assert!(measured, "experiments/figures/README.md: nothing measures {name}");
+        }
     }
 }
 
