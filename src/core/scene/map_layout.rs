@@ -265,7 +265,7 @@ mod tests {
     #[test]
     fn small_maps_that_would_take_much_memory_are_refused() {
         let map = || Some(Map { width: 2, height: 2, texels: vec![[0.0; 3]; 4] });
-        let maps = Maps { color: map(), ..Maps::default() };
+        let maps = Maps { color: map(), normal: map(), ..Maps::default() };
         let clamped = [Wrap::Clamp; 2];
         let wraps = Wraps { color: clamped, normal: clamped };
         let over = |most: f32| {
