@@ -7,6 +7,7 @@ mod correlated;
 mod damaged;
 mod image;
 mod resumed;
+mod rough;
 mod shares;
 mod uncertain;
 

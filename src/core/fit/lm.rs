@@ -13,6 +13,7 @@ use super::linearisation::{Linearisation, Passes};
 use super::memory::Memory;
 use super::options::Tolerances;
 use super::outcome::Ending;
+use super::recent::Recent;
 use super::varpro::Elimination;
 use crate::engine::Unknown;
 use argmin::core::{Error, IterState, KV, Problem, Solver, TerminationReason};
@@ -27,6 +28,8 @@ const LOSS_ROUNDING: f64 = 1e-8;
 const GAIN_ROUNDING: f64 = 1e-9;
 /// After so many steps in a row within rounding, there is nothing more to gain.
 const MOST_IDLE: u32 = 3;
+/// An undamped step that promises more than this share of the loss is not put down to a rough loss.
+const ROUGH_OUTLOOK: f64 = 1e-3;
 /// Damping at the start, beside the unit diagonal of the scaled H: nearly Gauss-Newton.
 const FIRST_DAMPING: f64 = 1e-4;
 /// Below this, damping changes no digit that matters.
@@ -85,6 +88,7 @@ impl<'a> LevenbergMarquardt<'a> {
             rejected: 0,
             forgiven: false,
             idle: 0,
+            recent: Recent::default(),
             renewed: None,
             first_loss: first.loss,
             ending: None,
@@ -200,7 +204,9 @@ impl<'a> LevenbergMarquardt<'a> {
         let promised = -memory.base.change(&step);
         let settled = largest <= self.tolerances.step
             || promised <= self.tolerances.gain(self.quadratic, memory.base.count) * memory.base.loss
-            || memory.idle >= MOST_IDLE;
+            || memory.idle >= MOST_IDLE
+            || (memory.recent.gained().is_some_and(|gained| gained <= self.tolerances.rough)
+                && promised <= ROUGH_OUTLOOK * memory.base.loss);
         // A long step along a direction that hardly matters is not taken unseen.
         if settled && largest <= 100.0 * self.tolerances.step {
             let stretched: Vec<f64> = step.iter().map(|d| d * memory.stretch).collect();
@@ -349,7 +355,11 @@ impl Solver<&Passes<'_>, LmState> for LevenbergMarquardt<'_> {
             self.memory.first_loss = self.memory.first_loss.min(trial.loss);
             self.memory.scaling.fill(0.0);
         }
-        let taken = if stale && trial.is_finite() { self.renew(trial) } else { self.judge(&step, trial) };
+        let renewed = stale && trial.is_finite();
+        let taken = if renewed { self.renew(trial) } else { self.judge(&step, trial) };
+        if !renewed {
+            self.memory.recent.note(self.memory.base.loss, taken);
+        }
         let ending =
             if taken { self.settle().then_some(Ending::Converged) } else { self.exhausted(promised) };
         Ok((self.report(state, ending), None))

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::linearisation::Linearisation;
 use super::outcome::Ending;
+use super::recent::Recent;
 
 /// All that the solver remembers between iterations; a fit resumed from it goes on to the bit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -29,6 +30,9 @@ pub struct Memory {
     pub(super) forgiven: bool,
     /// Steps taken in a row whose gain was within rounding.
     pub(super) idle: u32,
+    /// The last passes.
+    #[serde(default)]
+    pub(super) recent: Recent,
     /// The loss that was measured when the model was last made anew because elimination left nothing of it but
     /// rounding.
     pub(super) renewed: Option<f64>,
@@ -52,6 +56,7 @@ impl Memory {
         ];
         self.scaling.len() == self.base.len()
             && self.base.is_finite()
+            && self.recent.is_sound()
             && numbers.iter().chain(&self.scaling).all(|&x| x.is_finite() && x >= 0.0)
     }
 }

@@ -3,7 +3,8 @@
 //! - [`options`]: how a fit is to be done; `error`: why it cannot be
 //! - [`coordinates`], [`linearisation`]: what solvers step in, and what one pass tells them
 //! - [`bounded`]: the bounded least-squares step; [`room`]: where it may go
-//! - [`lm`], [`memory`]: Levenberg-Marquardt; [`varpro`]: what makes it variable projection
+//! - [`lm`], [`memory`]: Levenberg-Marquardt; `recent`: where a loss is too rough for it; [`varpro`]: what makes it variable
+//!   projection
 //! - [`transform`], [`unbounded`]: bounds and costs for `argmin`'s own solvers
 //! - `adam`: Adam, as one of `argmin`'s solvers
 //! - `drive`: the executor, watched
@@ -34,6 +35,7 @@ pub mod options;
 pub mod outcome;
 pub mod params_file;
 pub mod profile;
+mod recent;
 pub mod room;
 pub mod sandwich;
 pub mod starts;

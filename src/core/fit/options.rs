@@ -78,11 +78,16 @@ pub struct Tolerances {
     /// Stop when what the model promises moves the answer by less than this share of a standard
     /// error, that is when it is less than `error^2 / residuals` of the loss. The step is still taken.
     pub error: f64,
+    /// Stop where the last passes gained less than this share of the loss, although steps were turned back among them
+    /// that promised more: slopes are those of straight pieces there, or of what ends at once, and say no more of the
+    /// loss. Of half a million residuals that is three quarters of a standard error of independent noise, and some
+    /// hundredths of one of a model that does not fit.
+    pub rough: f64,
 }
 
 impl Default for Tolerances {
     fn default() -> Self {
-        Self { step: 1e-5, gain: 1e-10, robust_gain: 1e-8, error: 0.03 }
+        Self { step: 1e-5, gain: 1e-10, robust_gain: 1e-8, error: 0.03, rough: 1e-6 }
     }
 }
 

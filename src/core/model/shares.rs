@@ -26,14 +26,17 @@ pub fn wholes(effects: Option<Effects>) -> Vec<(&'static str, Vec<Param>)> {
 pub fn overfull(params: &Params, effects: Effects) -> Vec<String> {
     let mut told = Vec::new();
     for (whole, shares) in wholes(Some(effects)) {
-        for (total, name) in totals(params, &shares).into_iter().zip(["red", "green", "blue"]) {
-            if total > 1.0 + ROUNDING {
-                let names: Vec<&str> = shares.iter().map(|share| share.name()).collect();
-                told.push(format!(
-                    "{} add up to {total:.4} in {name}, more than the whole of {whole}: lower them to 1 or less together",
-                    names.join(", ")
-                ));
-            }
+        let names: Vec<&str> = shares.iter().map(|share| share.name()).collect();
+        let total = totals(params, &shares);
+        let channels = match total {
+            [red, green, blue] if red == green && green == blue => vec![(red, "")],
+            [red, green, blue] => vec![(red, " in red"), (green, " in green"), (blue, " in blue")],
+        };
+        for (total, channel) in channels.into_iter().filter(|(total, _)| *total > 1.0 + ROUNDING) {
+            told.push(format!(
+                "{} add up to {total:.4}{channel}, more than the whole of {whole}: lower them to 1 or less together",
+                names.join(", ")
+            ));
         }
     }
     told
@@ -85,5 +88,11 @@ mod tests {
         share_out(&mut params, three);
         assert!(overfull(&params, three).is_empty());
         assert_eq!(params.rgb(last), [0.0, 0.9, 0.0], "of an effect that is off");
+        for number in 1..4 {
+            let share = Param::from_name(&format!("diffusion_weight_{number}")).unwrap();
+            params.set_rgb(share, [0.5; 3]);
+        }
+        let told = overfull(&params, three);
+        assert!(told.len() == 1 && told[0].contains("add up to 1.5000, more than"), "{told:?}");
     }
 }

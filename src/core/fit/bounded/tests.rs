@@ -72,9 +72,9 @@ proptest! {
     }
 }
 
-/// The same in one unit, each variable in one of two sums or in none.
-fn summed() -> impl Strategy<Value = (Vec<f64>, Vec<f64>, Room)> {
-    (problem(), proptest::collection::vec(0_usize..3, 9), proptest::array::uniform2(0.0..1.0_f64)).prop_map(
+/// The same in one unit, each variable in none of two sums, in one or, of four `kinds`, in both (as one for all channels is).
+fn summed(kinds: usize) -> impl Strategy<Value = (Vec<f64>, Vec<f64>, Room)> {
+    (problem(), proptest::collection::vec(0..kinds, 9), proptest::array::uniform2(0.0..1.0_f64)).prop_map(
         |((k, h, g, lower, upper), group, left)| {
             let unit: Vec<f64> = (0..k).map(|i| h[i * k + i].sqrt().max(1e-9)).collect();
             let room = Room {
@@ -82,7 +82,7 @@ fn summed() -> impl Strategy<Value = (Vec<f64>, Vec<f64>, Room)> {
                 up: (0..k).map(|i| upper[i] * unit[i]).collect(),
                 sums: (1..3)
                     .map(|s| Sum {
-                        of: (0..k).filter(|&i| group[i] == s).collect(),
+                        of: (0..k).filter(|&i| group[i] == s || group[i] == 3).collect(),
                         // A third of them have no room at all.
                         room: (1.5 * left[s - 1] - 0.5).max(0.0),
                     })
@@ -98,7 +98,7 @@ fn summed() -> impl Strategy<Value = (Vec<f64>, Vec<f64>, Room)> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 2000, ..ProptestConfig::default() })]
     #[test]
-    fn a_step_within_sums_meets_the_kkt_conditions((h, g, room) in summed()) {
+    fn a_step_within_sums_meets_the_kkt_conditions((h, g, room) in summed(3)) {
         let k = g.len();
         let d = minimise(&h, &g, &room);
         let least = SymmetricEigen::new(DMatrix::from_row_slice(k, k, &h)).eigenvalues.min();
@@ -137,7 +137,7 @@ proptest! {
     }
 
     #[test]
-    fn no_point_within_sums_is_lower((h, g, room) in summed(), seed in any::<u64>()) {
+    fn no_point_within_sums_is_lower((h, g, room) in summed(4), seed in any::<u64>()) {
         use rand::{RngExt, SeedableRng};
         let k = g.len();
         let value = |d: &[f64]| {
@@ -145,6 +145,11 @@ proptest! {
             (0..k).map(|i| d[i] * (g[i] + 0.5 * hd(i))).sum::<f64>()
         };
         let best = minimise(&h, &g, &room);
+        for sum in &room.sums {
+            let total: f64 = sum.of.iter().map(|&i| best[i]).sum();
+            // Rounding, as above.
+            prop_assert!(total <= sum.room + 1e-9, "{total} > {}", sum.room);
+        }
         let mut rng = rand::rngs::StdRng::seed_from_u64(seed);
         for _ in 0..50 {
             let near = |i: usize| best[i] + rng.random_range(-0.1..0.1_f64);
