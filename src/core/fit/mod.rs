@@ -109,12 +109,23 @@ pub fn fit_watched(
         if coordinates.unknowns().is_empty() {
             log.saved.runs[index as usize].ending = Some(Ending::Converged);
         } else if !log.saved.runs[index as usize].is_over(most) {
-            drive::run(options.solver, &mut log)?;
+            drive::run(options.solver, &mut log).map_err(|error| of_resumed(error, options))?;
         }
     }
     log.write()?;
     let saved = log.saved;
     Ok(conclude(objective, &coordinates, start, options, &saved))
+}
+
+/// A solver that fails where a state has left it was led there by numbers that no fit has left.
+fn of_resumed(error: FitError, options: &FitOptions) -> FitError {
+    match (error, &options.resume) {
+        (FitError::Solver { solver, reason }, Some(path)) => {
+            let reason = format!("the solver {solver} fails from there, as {reason}");
+            state::StateError::Corrupt { path: path.clone(), reason }.into()
+        }
+        (error, _) => error,
+    }
 }
 
 fn check_bounds(coordinates: &Coordinates, start: &Point) -> Result<(), FitError> {

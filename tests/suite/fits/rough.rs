@@ -11,28 +11,31 @@ use super::image::{Image, point, truth};
 const OFF: f64 = 2e-3;
 
 /// An image whose slopes along curved unknowns are off, this way and that from place to place.
-struct Rough(Image);
+struct Rough {
+    image: Image,
+    /// How fast that changes: what is left of a large multiple looks like chance.
+    fine: f64,
+}
 
 impl Objective for Rough {
     fn unknowns(&self) -> &[Unknown] {
-        self.0.unknowns()
+        self.image.unknowns()
     }
     fn is_quadratic(&self) -> bool {
         true
     }
     fn normal_equations(&self, point: &Point) -> NormalEquations {
-        let mut sums = self.0.normal_equations(point);
+        let mut sums = self.image.normal_equations(point);
         let k = self.unknowns().len();
         let curved = self.unknowns().iter().enumerate().filter(|(_, unknown)| !unknown.linear());
         for (i, unknown) in curved {
-            // What is left of a large multiple looks like chance.
-            let off = 2.0 * (unknown.get(point) * 1e7).sin();
+            let off = 2.0 * (unknown.get(point) * self.fine).sin();
             sums.jtr[i] += OFF * off * (sums.jtj[i * k + i] * sums.residual).sqrt();
         }
         sums
     }
     fn loss(&self, point: &Point) -> f64 {
-        self.0.loss(point)
+        self.image.loss(point)
     }
     fn gradient(&self, point: &Point) -> (f64, Vec<f64>) {
         self.normal_equations(point).loss_and_gradient()
@@ -49,16 +52,20 @@ fn fitted(image: &Rough, solver: SolverKind, rough: f64) -> Outcome {
 fn a_fit_of_a_rough_loss_ends_where_it_gains_nothing_more() {
     let image = Image::new(4000, &truth()).with_noise(0.02, 5);
     let best = fit(&image, &point(&[]), &FitOptions::default(), &mut |_| {}).unwrap();
-    let image = Rough(image);
-    for solver in [SolverKind::Varpro, SolverKind::Lm] {
+    let (mut passes, mut patient) = (0, 0);
+    for (solver, fine) in
+        [SolverKind::Varpro, SolverKind::Lm].iter().flat_map(|s| [1e7, 2e7, 3e7, 4e7].map(|f| (*s, f)))
+    {
+        let image = Rough { image: image.clone(), fine };
         let outcome = fitted(&image, solver, Tolerances::default().rough);
-        let patient = fitted(&image, solver, 0.0);
-        println!("{solver:?}: {} passes, {} by patience", outcome.evaluations, patient.evaluations);
         assert_eq!(outcome.ending, Ending::Converged, "{solver:?}");
-        assert!(outcome.evaluations < patient.evaluations, "{solver:?}: no sooner than without looking back");
-        assert!(outcome.evaluations < 40, "{solver:?}: {} passes", outcome.evaluations);
         // Slopes that are off by OFF promise the square of it, for each unknown.
         let above = outcome.loss_end / best.loss_end - 1.0;
         assert!(above < 10.0 * OFF * OFF, "{solver:?}: {above:e} above the best");
+        passes += outcome.evaluations;
+        patient += fitted(&image, solver, 0.0).evaluations;
     }
+    println!("{passes} passes, {patient} by patience");
+    // Eight fits; without a look back some go on for as long again.
+    assert!(passes < patient && passes < 8 * 25, "{passes} passes, {patient} without a look back");
 }
