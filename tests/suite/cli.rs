@@ -10,6 +10,8 @@ mod damaged;
 mod engines;
 mod exported;
 mod followed;
+#[cfg(target_os = "linux")]
+mod godot;
 mod graphics;
 mod held_out;
 mod interrupted;

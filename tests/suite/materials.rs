@@ -60,7 +60,7 @@ fn exported(target: Target, facts: &Facts, name: &str) -> (String, String) {
 }
 
 /// A text with its part replaced, which has to be there.
-fn replaced(text: &str, from: &str, to: &str) -> String {
+pub(crate) fn replaced(text: &str, from: &str, to: &str) -> String {
     assert!(text.contains(from), "{from} is not there: {text}");
     text.replacen(from, to, 1)
 }
@@ -106,13 +106,18 @@ fn godot_stage(code: &str, stage: &str) -> String {
     replaced(&text, &format!("void {stage}("), "void main(")
 }
 
+/// The shader within a material of Godot, and the lines behind it.
+pub(crate) fn godots_code(material: &str) -> (String, &str) {
+    let (_, code) = material.split_once("\ncode = \"").unwrap();
+    let (code, values) = code.split_once("\"\n\n[resource]").unwrap();
+    (code.replace("\\\"", "\"").replace("\\\\", "\\"), values)
+}
+
 #[test]
 fn godots_material_is_its_language_around_the_shader() {
     for facts in scenes() {
         let (shader, material) = exported(Target::Godot, &facts, "res://skin.gdshaderinc");
-        let (_, code) = material.split_once("\ncode = \"").unwrap();
-        let (code, values) = code.split_once("\"\n\n[resource]").unwrap();
-        let code = code.replace("\\\"", "\"").replace("\\\\", "\\");
+        let (code, values) = godots_code(&material);
         let include = "#include \"res://skin.gdshaderinc\"";
         for (stage, short, given) in [("vertex", "vert", GODOT_VERTEX), ("fragment", "frag", GODOT_FRAGMENT)]
         {

@@ -48,6 +48,8 @@ pub struct Dialect {
     pub filters: [&'static str; 3],
     /// The bits of a vector's floats; empty where the language has none, but `isfinite`.
     pub bits: &'static str,
+    /// An unsigned number in hexadecimal, `{x}` its digits in capitals; empty: as WGSL has it.
+    pub hexadecimal: &'static str,
     /// What stands before the constants and behind them, where a material may have them in place of the text.
     pub around_constants: [&'static str; 2],
     /// Lines that come first.
@@ -70,6 +72,7 @@ const BASE: Dialect = Dialect {
     samplers: ["skinfit_map_sampler", "skinfit_cube_sampler"],
     filters: [""; 3],
     bits: "",
+    hexadecimal: "",
     around_constants: [""; 2],
     prologue: "",
     epilogue: "",
@@ -114,6 +117,8 @@ pub const GODOT: Dialect = Dialect {
         "filter_linear_mipmap, repeat",
         "filter_linear_mipmap_anisotropic, repeat",
     ],
+    // Godot 4.0 takes no suffix behind such digits, Godot 3 none in lower case (Godot's issues 78800 and 46507).
+    hexadecimal: "uint(0x{x})",
     ..GLSL
 };
 
@@ -220,6 +225,17 @@ impl Dialect {
             (Family::Msl, "dpdx") => "dfdx",
             (Family::Msl, "dpdy") => "dfdy",
             _ => wgsl,
+        }
+    }
+
+    /// A number of the rules.
+    #[must_use]
+    pub fn number(&self, wgsl: &str) -> String {
+        match wgsl.strip_prefix("0x").and_then(|digits| digits.strip_suffix('u')) {
+            Some(digits) if !self.hexadecimal.is_empty() => {
+                self.hexadecimal.replace("{x}", &digits.to_uppercase())
+            }
+            _ => wgsl.to_owned(),
         }
     }
 

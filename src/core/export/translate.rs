@@ -30,7 +30,7 @@ impl<'a> Translation<'a> {
                 // A number is no word, though it may hold letters (0x7f800000u, 1e-37).
                 let end = self.rest.find(|c: char| !c.is_ascii_alphanumeric()).unwrap_or(self.rest.len());
                 let number = self.take(end);
-                self.text.push_str(number);
+                self.text.push_str(&self.dialect.number(number));
             } else {
                 let other = self.take(first.len_utf8());
                 self.text.push_str(other);
@@ -166,7 +166,7 @@ impl<'a> Translation<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::export::dialect::{CG, GLSL, HLSL, MSL, WGSL};
+    use crate::export::dialect::{CG, GLSL, GODOT, HLSL, MSL, WGSL};
 
     const RULE: &str = "// Of S.z.\nfn rim_power(\n    z: f32,\n    e: vec3f,\n) -> f32 {\n    let ok: bool = z >= 1.2e-38;\n    return select(select(1.0, 0.0, e.x > 0.0), exp2(z), ok);\n}\n";
 
@@ -190,6 +190,7 @@ mod tests {
         assert_eq!(translate(&CG, filtered), "tex2D(color_map, vertex_uv).rgb");
         let bits = "bitcast<vec3u>(v) & vec3u(0x7f800000u)";
         assert_eq!(translate(&GLSL, bits), "floatBitsToUint(v) & uvec3(0x7f800000u)");
+        assert_eq!(translate(&GODOT, bits), "floatBitsToUint(v) & uvec3(uint(0x7F800000))");
         assert_eq!(translate(&HLSL, bits), "asuint(v) & uint3(0x7f800000u, 0x7f800000u, 0x7f800000u)");
         assert_eq!(
             translate(&CG, "fn is_finite(v: vec3f) -> bool {\n    let b: f32 = 1.0;\n}\n"),

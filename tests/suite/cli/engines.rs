@@ -16,7 +16,7 @@ use crate::by_rules::{Cubes, Fragments, Wanted};
 use crate::fixtures::read_exr;
 
 /// A half as a number, by the definition of IEEE 754 binary16; no infinities are written.
-fn half(bytes: &[u8]) -> f32 {
+pub(super) fn half(bytes: &[u8]) -> f32 {
     let bits = u16::from_le_bytes([bytes[0], bytes[1]]);
     let (exponent, fraction) = (i32::from(bits >> 10 & 31), f32::from(bits & 1023));
     let size = match exponent {

@@ -29,8 +29,9 @@ pub(super) fn text(parts: &Parts<'_>) -> Result<String, ExportError> {
         values += &format!("shader_parameter/{name} = ExtResource(\"{i}\")\n");
     }
     Ok(format!(
-        "[gd_resource type=\"ShaderMaterial\" format=3]\n\n; Give each path as the project has it. Occlusion is the \
-         first number of the second texture coordinates.\n{files}\n[sub_resource type=\"Shader\" id=\"skin\"]\n\
+        "[gd_resource type=\"ShaderMaterial\" format=3]\n\n; For the renderers Forward+ and Mobile: in Compatibility, \
+         shaders work in sRGB.\n; Give each path as the project has it. Occlusion is the first number of the second \
+         texture coordinates.\n{files}\n[sub_resource type=\"Shader\" id=\"skin\"]\n\
          code = \"{code}\"\n\n[resource]\nshader = SubResource(\"skin\")\n{values}"
     ))
 }
