@@ -101,7 +101,13 @@ impl Exposure {
         self.codes[pixel].iter().any(|code| *code >= from)
     }
 
-    /// Whether a channel of a pixel tells its radiance: the pixel is not clipped, and the channel not dark.
+    /// Whether a channel of a pixel is neither clipped nor dark, whatever the others are.
+    #[must_use]
+    pub fn open(&self, pixel: usize, channel: usize) -> bool {
+        (1..self.clipped_from()).contains(&self.codes[pixel][channel])
+    }
+
+    /// Whether a channel of a pixel tells its radiance though channels mix: no channel is clipped, and it is not dark.
     #[must_use]
     pub fn sees(&self, pixel: usize, channel: usize) -> bool {
         self.codes[pixel][channel] > 0 && !self.clips(pixel)

@@ -3,11 +3,15 @@
 //! - this file: what goes in and comes out, and the merge as a whole
 //! - [`exposure`]: one exposure, and whether several belong together
 //! - `pixel`: the radiance of one pixel, under each weighting
+//! - `pairs`: what two exposures show of the same light
+//! - `clipping`: whether a clipped channel spoils the others of its pixel
 //! - [`align`]: how far exposures are shifted against each other
 //! - [`times`]: whether the shutter times fit the pictures
 
 pub mod align;
+mod clipping;
 pub mod exposure;
+mod pairs;
 mod pixel;
 pub mod times;
 
@@ -118,8 +122,11 @@ pub struct Merged {
     /// Radiance, linear, in the unit of the response per second: under [`Response::Srgb`], 1 fills a pixel in a second.
     /// Its primaries are the codes'.
     pub picture: Picture,
-    /// How many exposures see each pixel in all channels, neither clipped nor dark.
+    /// How many exposures see each pixel, in the channel that the fewest see; 0, too, where in each of them some channel
+    /// clips.
     pub seen: Vec<u8>,
+    /// Whether pixels with a clipped channel were left out as a whole.
+    pub clipping_spoils: bool,
     /// How many pixels are not known.
     pub counts: Counts,
     /// The shifts between exposures next in shutter time.
@@ -135,8 +142,9 @@ const TIME_DOUBT: f64 = 0.05;
 
 /// Merges exposures of one view, in any order, to radiance.
 ///
-/// A pixel with any channel within a step of the highest code is clipped, and all of its channels are left out, as
-/// demosaicing and JPEG mix them. A channel of code 0 is dark, and left out by itself.
+/// A channel within a step of the highest code is clipped and left out, and with it the others of its pixel: demosaicing
+/// and JPEG mix them. Only where the exposures show that theirs are not mixed do the others count. A channel of code 0
+/// is dark, and left out by itself.
 ///
 /// # Errors
 /// Exposures that do not belong together, and a response or a noise model that is none.
@@ -173,8 +181,9 @@ pub fn merge(
             seen.push(by);
         }
     }
+    let (picture, clipping_spoils) = (Picture { width, height, texels }, merger.spoils);
     let doubts = doubts(&shifts, &times, options.align);
-    Ok(Merged { picture: Picture { width, height, texels }, seen, counts, shifts, times, doubts })
+    Ok(Merged { picture, seen, clipping_spoils, counts, shifts, times, doubts })
 }
 
 /// The response of each exposure's codes: those of one depth share it.

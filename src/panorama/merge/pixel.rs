@@ -1,6 +1,6 @@
 //! The radiance of one pixel, under each weighting.
 
-use super::{Exposure, Weighting};
+use super::{Exposure, Weighting, clipping};
 use crate::response::Curve;
 
 /// An exposure where its pixels lie.
@@ -27,8 +27,24 @@ impl Place<'_> {
         self.curve.exposures[usize::from(self.exposure.codes[pixel][channel])][channel]
     }
 
-    fn slope(&self, pixel: usize, channel: usize) -> f64 {
-        self.curve.slopes[usize::from(self.exposure.codes[pixel][channel])][channel]
+    /// X as a share of the full well.
+    pub(super) fn filled(&self, pixel: usize, channel: usize) -> f64 {
+        self.x(pixel, channel) / self.full(channel)
+    }
+
+    /// X of the highest code, which stands for the full well.
+    fn full(&self, channel: usize) -> f64 {
+        self.curve.exposures.last().map_or(1.0, |x| x[channel])
+    }
+
+    fn look(&self, pixel: usize, channel: usize) -> Look {
+        let code = self.exposure.codes[pixel][channel];
+        Look {
+            x: self.filled(pixel, channel),
+            slope: self.curve.slopes[usize::from(code)][channel] / self.full(channel),
+            seconds: self.exposure.seconds,
+            share: f64::from(code) / f64::from(self.exposure.most),
+        }
     }
 }
 
@@ -66,12 +82,20 @@ pub(super) struct Merger<'a> {
     /// From the shortest to the longest.
     places: Vec<Place<'a>>,
     weighting: Weighting,
+    /// Whether a clipped channel spoils the others of its pixel.
+    pub(super) spoils: bool,
 }
 
 impl<'a> Merger<'a> {
     pub(super) fn new(mut places: Vec<Place<'a>>, weighting: Weighting) -> Self {
         places.sort_by(|a, b| a.exposure.seconds.total_cmp(&b.exposure.seconds));
-        Self { places, weighting }
+        let spoils = clipping::spoils(&places);
+        Self { places, weighting, spoils }
+    }
+
+    /// Whether an exposure tells the radiance of a channel of one of its pixels.
+    fn sees(&self, exposure: &Exposure, pixel: usize, channel: usize) -> bool {
+        if self.spoils { exposure.sees(pixel, channel) } else { exposure.open(pixel, channel) }
     }
 
     pub(super) fn pixel(&self, x: usize, y: usize) -> Pixel {
@@ -88,15 +112,13 @@ impl<'a> Merger<'a> {
         let mut looks = Vec::with_capacity(inside.len());
         for c in 0..3 {
             looks.clear();
-            let sees = |(place, at): &&(&Place<'_>, usize)| place.exposure.sees(*at, c);
-            looks.extend(inside.iter().filter(sees).map(|(place, at)| look(place, *at, c)));
+            let sees = |(place, at): &&(&Place<'_>, usize)| self.sees(place.exposure, *at, c);
+            looks.extend(inside.iter().filter(sees).map(|(place, at)| place.look(*at, c)));
             let by = looks.len();
             if by == 0 {
                 // Another channel's clipping spoils this one less than having nothing.
-                let unclipped = |(place, at): &&(&Place<'_>, usize)| {
-                    (1..place.exposure.clipped_from()).contains(&place.exposure.codes[*at][c])
-                };
-                looks.extend(inside.iter().filter(unclipped).map(|(place, at)| look(place, *at, c)));
+                let open = |(place, at): &&(&Place<'_>, usize)| place.exposure.open(*at, c);
+                looks.extend(inside.iter().filter(open).map(|(place, at)| place.look(*at, c)));
             }
             (radiance[c], seen) = if looks.is_empty() {
                 let (bound, of) = bound(&inside, c);
@@ -106,7 +128,7 @@ impl<'a> Merger<'a> {
                     Seen::By(count) => Seen::By(count.min(by.min(255) as u8)),
                     other => other,
                 };
-                (full(shortest, c) * self.pooled(&looks), fewer)
+                (shortest.full(c) * self.pooled(&looks), fewer)
             };
         }
         Pixel { radiance, seen }
@@ -119,18 +141,6 @@ impl<'a> Merger<'a> {
             Weighting::Hat => by_hat(looks),
         }
     }
-}
-
-fn look(place: &Place<'_>, at: usize, channel: usize) -> Look {
-    let full = full(place, channel);
-    let share = f64::from(place.exposure.codes[at][channel]) / f64::from(place.exposure.most);
-    let seconds = place.exposure.seconds;
-    Look { x: place.x(at, channel) / full, slope: place.slope(at, channel) / full, seconds, share }
-}
-
-/// X of the highest code, which stands for the full well.
-fn full(place: &Place<'_>, channel: usize) -> f64 {
-    place.curve.exposures.last().map_or(1.0, |x| x[channel])
 }
 
 /// What a channel is at least that no exposure sees.

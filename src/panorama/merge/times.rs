@@ -7,15 +7,12 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::pairs::{Pair, pairs};
 use super::pixel::Place;
 use crate::robust::median;
 
-/// Pixels that are looked at, at most.
-const LOOKED_AT: usize = 100_000;
 /// Pixels that two exposures must both see.
 const NEEDED: usize = 64;
-/// The lowest code that counts, as a share of the highest: below, rounding alone is worth 5 %.
-const LOWEST: f64 = 20.0 / 255.0;
 
 /// An exposure's shutter time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,24 +67,9 @@ pub(super) fn measure(places: &[Place<'_>]) -> Vec<ShutterTime> {
 
 /// ln of how much longer `b` was open against `a` than told, and the number of values that it rests on.
 fn ratio(a: &Place<'_>, b: &Place<'_>) -> Option<(f64, usize)> {
-    let (width, height) = (a.exposure.width, a.exposure.height);
-    let step = (width * height / LOOKED_AT).max(1);
     let told = (b.exposure.seconds / a.exposure.seconds).ln();
-    let mut logs = Vec::new();
-    for i in (0..width * height).step_by(step) {
-        // From the merged picture's pixel to each one's.
-        let (Some(of_a), Some(of_b)) = (a.at(i % width, i / width), b.at(i % width, i / width)) else {
-            continue;
-        };
-        for c in 0..3 {
-            let well = |place: &Place<'_>, at: usize| {
-                let share = f64::from(place.exposure.codes[at][c]) / f64::from(place.exposure.most);
-                share >= LOWEST && place.exposure.sees(at, c) && place.x(at, c) > 0.0
-            };
-            if well(a, of_a) && well(b, of_b) {
-                logs.push((b.x(of_b, c) / a.x(of_a, c)).ln() - told);
-            }
-        }
-    }
+    let seen = |pair: &Pair| a.exposure.sees(pair.a, pair.channel) && b.exposure.sees(pair.b, pair.channel);
+    let log = |pair: Pair| (b.x(pair.b, pair.channel) / a.x(pair.a, pair.channel)).ln() - told;
+    let mut logs: Vec<f64> = pairs(a, b).filter(seen).map(log).collect();
     (logs.len() >= NEEDED).then(|| (median(&mut logs).unwrap_or(0.0), logs.len()))
 }

@@ -4,10 +4,11 @@ mod common;
 #[path = "common/rendered.rs"]
 mod rendered;
 
-use common::{data, panorama};
+use common::{data, panorama, srgb_code};
 use glam::{DQuat, DVec2, DVec3};
 use rand::{RngExt, SeedableRng};
-use rendered::{error, radiance, shot, truth};
+use rendered::{error, shot, truth};
+use skinfit_panorama::latlong::{direction_to_uv, uv_to_direction};
 use skinfit_panorama::lens::{Fisheye, Lens, MirrorBall, Projection};
 use skinfit_panorama::merge::{Exposure, MergeOptions, merge};
 use skinfit_panorama::picture::Picture;
@@ -28,9 +29,41 @@ fn forest() -> Option<Picture> {
     Some(panorama(&data()?.join("env/forest.exr")))
 }
 
+/// A world's radiance in a direction: a panorama's texels as the weights of cubic B-splines over its lat-long grid, which
+/// holds next to nothing above half of the grid's Nyquist frequency, so that no shot's pixel is too wide for it.
+fn radiance(world: &Picture, direction: DVec3) -> [f64; 3] {
+    let (u, v) = direction_to_uv(direction);
+    let (x, y) = (u * world.width as f64 - 0.5, v * world.height as f64 - 0.5);
+    let weights = |t: f64| {
+        let s = 1.0 - t;
+        let side = |t: f64| (3.0 * t * t * t - 6.0 * t * t + 4.0) / 6.0;
+        [s * s * s / 6.0, side(t), side(s), t * t * t / 6.0]
+    };
+    let (across, down) = (weights(x - x.floor()), weights(y - y.floor()));
+    let mut sum = [0.0; 3];
+    for (j, wy) in down.into_iter().enumerate() {
+        // Beyond a pole, the sphere goes on half a turn around.
+        let row = y.floor() as i64 + j as i64 - 1;
+        let height = world.height as i64;
+        let (row, turn) = match row {
+            row if row < 0 => (-1 - row, world.width / 2),
+            row if row >= height => (2 * height - 1 - row, world.width / 2),
+            row => (row, 0),
+        };
+        for (i, wx) in across.into_iter().enumerate() {
+            let column = (x.floor() as i64 + i as i64 - 1 + turn as i64).rem_euclid(world.width as i64);
+            let texel = world.texels[row as usize * world.width + column as usize];
+            for c in 0..3 {
+                sum[c] += wx * wy * f64::from(texel[c]);
+            }
+        }
+    }
+    sum
+}
+
 /// A shot as it is told, `off` from where it was rendered and `brighter` than the world.
 fn told(world: &Picture, lens: Lens, real: DQuat, off: DQuat, brighter: f32, size: usize) -> Shot {
-    let mut picture = shot(world, &lens, real, size);
+    let mut picture = shot(|d| radiance(world, d), &lens, real, size);
     for texel in &mut picture.texels {
         *texel = texel.map(|x| x * brighter);
     }
@@ -47,7 +80,7 @@ fn two_fisheyes_back_to_back() {
     let first = DQuat::from_rotation_x(0.1) * DQuat::from_rotation_y(0.4);
     let second = first * DQuat::from_rotation_y(std::f64::consts::PI);
     let off = DQuat::from_axis_angle(DVec3::new(0.5, 0.7, -0.3).normalize(), 3f64.to_radians());
-    let right = truth(&world, 1024);
+    let right = truth(|d| radiance(&world, d), 1024);
     for projection in [Projection::Equidistant, Projection::Equisolid] {
         let lens = fisheye(projection, SIZE);
         let mut shots = [
@@ -90,9 +123,7 @@ fn exposed(light: &Picture, seconds: f64, random: &mut rand::rngs::StdRng) -> Ex
         // Two even numbers make a normal one (Box and Muller 1958); many electrons are as good as normal.
         let (a, b) = (1.0 - random.random::<f64>(), random.random::<f64>());
         let normal = (-2.0 * a.ln()).sqrt() * (std::f64::consts::TAU * b).cos();
-        let x = (x + normal * (x / 2e4 + (4.0f64 / 2e4).powi(2)).sqrt()).clamp(0.0, 1.0);
-        let encoded = if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 };
-        (encoded * 255.0).round() as u16
+        srgb_code(x + normal * (x / 2e4 + (4.0f64 / 2e4).powi(2)).sqrt())
     };
     let codes = light.texels.iter().map(|rgb| rgb.map(&mut code)).collect();
     Exposure { width: light.width, height: light.height, codes, most: 255, seconds }
@@ -117,7 +148,7 @@ fn from_codes_to_a_panorama() {
     let stitched = stitch(&shots, &StitchOptions { width: 1024, ..Default::default() }).unwrap();
     assert!(stitched.doubts.is_empty(), "{:?}", stitched.doubts);
     let (angle, gain) = (off_degrees(&stitched, 1, second), stitched.gains[1] * 1.07 - 1.0);
-    let (size, signed) = error(&stitched.panorama, &truth(&world, 1024), |_| true);
+    let (size, signed) = error(&stitched.panorama, &truth(|d| radiance(&world, d), 1024), |_| true);
     println!(
         "from codes: off by {:.4} texels, gain by {gain:+.5}, radiance by {size:.5} ({signed:+.5})",
         angle / TEXEL
@@ -200,7 +231,7 @@ fn mirror_balls_unwrap() {
     let ball =
         MirrorBall { centre: DVec2::splat(half), radius: half - 3.0, camera_degrees: 8.0, trusted: 0.97 };
     let lens = Lens::MirrorBall(ball);
-    let right = truth(&world, 1024);
+    let right = truth(|d| radiance(&world, d), 1024);
     let looking = DQuat::from_rotation_y(0.7) * DQuat::from_rotation_x(-0.1);
     let one = told(&world, lens, looking, DQuat::IDENTITY, 1.0, SIZE);
     let options = StitchOptions { width: 1024, ..Default::default() };
@@ -254,7 +285,7 @@ fn a_shot_finer_than_the_panorama_is_averaged() {
     }
     for i in 0..1024 * 512 {
         let (u, v) = (0.25 + 0.5 * (f64::from(i % 1024) + 0.5) / 1024.0, (f64::from(i / 1024) + 0.5) / 512.0);
-        let direction = skinfit_panorama::latlong::uv_to_direction(u, v);
+        let direction = uv_to_direction(u, v);
         right += radiance(&world, direction)[1] * (std::f64::consts::PI * v).sin() / 512.0;
     }
     println!("light of a hemisphere: {:+.5}", got / right - 1.0);

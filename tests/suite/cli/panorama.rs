@@ -5,8 +5,11 @@
 #[path = "../../../src/panorama/tests/common/rendered.rs"]
 mod rendered;
 
+use std::path::Path;
+
 use glam::{DQuat, DVec2, DVec3};
 use image::{ImageFormat, Rgb, RgbImage};
+use skinfit::bake::panorama::sample_latlong;
 use skinfit_panorama::lens::{Fisheye, Lens, Projection};
 use skinfit_panorama::picture::Picture;
 
@@ -32,6 +35,7 @@ fn brackets_are_merged_to_the_radiance_that_they_are_of() {
     let times: Vec<String> =
         images.iter().map(|image| image["shutter_s"].as_f64().unwrap().to_string()).collect();
     let times = times.join(",");
+    let photographs: Vec<RgbImage> = files.iter().map(|file| image::open(file).unwrap().to_rgb8()).collect();
     let files: Vec<&str> = files.iter().map(String::as_str).collect();
     let arguments = [&["panorama", "merge"], &files[..], &["--seconds", &times, "-o", "merged.exr"]].concat();
     let ran = sandbox.run(&arguments);
@@ -42,23 +46,29 @@ fn brackets_are_merged_to_the_radiance_that_they_are_of() {
     let merged = read_exr(&sandbox.path("merged.exr"));
     let truth = read_exr(&data.join("env/studio.exr"));
     assert_eq!((merged.width, merged.height), (truth.width, truth.height));
+    let seen_by = |pixel: usize| {
+        let at = (pixel % truth.width, pixel / truth.width);
+        let sees = |photograph: &&RgbImage| {
+            // Neither black, nor within a step of the highest code.
+            photograph.get_pixel(at.0 as u32, at.1 as u32).0.iter().all(|code| (1..254).contains(code))
+        };
+        photographs.iter().filter(sees).count()
+    };
     let mut errors = Vec::new();
-    for channel in ["R", "G", "B"] {
-        for (got, want) in merged.planes[channel].iter().zip(&truth.planes[channel]) {
-            let want = scale * f64::from(*want);
-            // What the longest sees well and the shortest does not clip.
-            if (2.0..500.0).contains(&want) {
-                errors.push((f64::from(*got) / want - 1.0).abs());
-            }
+    for pixel in (0..truth.width * truth.height).filter(|&pixel| seen_by(pixel) >= 2) {
+        for channel in ["R", "G", "B"] {
+            let [got, want] = [&merged, &truth].map(|image| f64::from(image.planes[channel][pixel]));
+            errors.push((got / (scale * want) - 1.0).abs());
         }
     }
-    assert!(errors.len() > 100_000, "{}", errors.len());
-    errors.sort_by(f64::total_cmp);
-    // Noise of the sensor and 8 bits: 2% are asked for in the middle.
+    assert!(errors.len() > 200_000, "{}", errors.len());
     for (name, share) in [("median", 0.5), ("most", 0.95)] {
         crate::figures::measured(&format!("merged {name}"), quantile(&errors, share));
     }
-    assert!(quantile(&errors, 0.5) < 0.02, "{}", quantile(&errors, 0.5));
+    // 2% are asked for. The sensor's noise and 8 bits allow 1.91% there and 0.62% in the median (the bound of Cramer
+    // and Rao, which the merge's own tests hold it to), and the file's 16 bits are off by 0.05% at most.
+    assert!(quantile(&errors, 0.95) < 0.02, "{}", quantile(&errors, 0.95));
+    assert!(quantile(&errors, 0.5) < 0.0065, "{}", quantile(&errors, 0.5));
 }
 
 /// Photographs of one view with a response that is a power, of which the file of a table gives back the light.
@@ -224,18 +234,22 @@ fn shots_of_an_even_room_become_an_even_panorama_that_a_scene_takes() {
 }
 
 /// A picture's RGB planes.
-fn picture(file: &std::path::Path) -> Picture {
+fn picture(file: &Path) -> Picture {
     let planes = read_exr(file);
     Picture { width: planes.width, height: planes.height, texels: planes.rgb(["R", "G", "B"]) }
 }
 
 /// Two fisheyes back to back, of which the second is told wrong and a little brighter: what their panorama makes of a
-/// fit.
+/// fit, beside the very panorama that they are of, as scenes read it. A pixel of theirs is 0.2 degrees wide and its texels
+/// 0.7, so that they show all of it; the stitch's are 0.18.
 #[test]
 fn constants_fitted_under_stitched_light_are_those_under_the_true_one() {
     let Some(data) = common::data() else { return };
     let data = data.canonicalize().unwrap();
-    let world = picture(&data.join("env/forest.exr"));
+    let forest = data.join("env/forest.exr");
+    let Picture { width, height, texels } = picture(&forest);
+    let texel = |x: usize, y: usize| texels[y * width + x].map(f64::from);
+    let world = |d: DVec3| sample_latlong(width, height, texel, d.to_array());
     let sandbox = Sandbox::with_shared_bakes();
     const SIZE: usize = 1000;
     let (centre, radius) = (DVec2::splat(500.0), 494.0);
@@ -251,7 +265,7 @@ fn constants_fitted_under_stitched_light_are_those_under_the_true_one() {
     let mut shots = String::new();
     for (name, real, told, brighter) in [("a.exr", first, first, 1.0), ("b.exr", second, off * second, 1.07)]
     {
-        let shot = rendered::shot(&world, &lens, real, SIZE);
+        let shot = rendered::shot(world, &lens, real, SIZE);
         sandbox.write_exr(name, SIZE, SIZE, |x, y| shot.texels[y * SIZE + x].map(|x| x * brighter));
         let (towards, up) = ((told * DVec3::NEG_Z).to_array(), (told * DVec3::Y).to_array());
         shots += &format!(
@@ -261,17 +275,16 @@ fn constants_fitted_under_stitched_light_are_those_under_the_true_one() {
         );
     }
     sandbox.write("shots.toml", shots.as_bytes());
-    let ran = sandbox.run(&["panorama", "stitch", "shots.toml", "-o", "stitched.exr", "--width", "1024"]);
+    let ran = sandbox.run(&["panorama", "stitch", "shots.toml", "-o", "stitched.exr", "--width", "2048"]);
     assert_eq!(ran.code, Some(0), "{}", ran.err);
-    let truth = rendered::truth(&world, 1024);
-    sandbox.write_exr("true.exr", 1024, 512, |x, y| truth.texels[y * 1024 + x]);
-    let (size, signed) = rendered::error(&picture(&sandbox.path("stitched.exr")), &truth, |_| true);
+    let stitched = sandbox.path("stitched.exr");
+    let (size, signed) = rendered::error(&picture(&stitched), &rendered::truth(world, 2048), |_| true);
     crate::figures::measured("stitched radiance", size);
     // As the stitch's own tests have it.
     assert!(size < 0.01, "{size} {signed}");
-    let fitted = |light: &str| {
+    let fitted = |light: &Path| {
         let mut scene: toml::Table = scene_text(&data, "lps_forest").parse().unwrap();
-        scene["environment"]["file"] = sandbox.path(light).to_str().unwrap().into();
+        scene["environment"]["file"] = light.to_str().unwrap().into();
         sandbox.write("forest.toml", scene.to_string().as_bytes());
         let ran = sandbox.run(&["fit", "forest.toml", "-o", "run", "--engine", "cpu"]);
         assert_eq!(ran.code, Some(0), "{}", ran.err);
@@ -281,12 +294,13 @@ fn constants_fitted_under_stitched_light_are_those_under_the_true_one() {
         };
         report["unknowns"].as_array().unwrap().iter().map(unknown).collect::<Vec<_>>()
     };
-    let (want, got) = (fitted("true.exr"), fitted("stitched.exr"));
+    let (want, got) = (fitted(&forest), fitted(&stitched));
     assert_eq!(got.len(), want.len());
     for ((name, want), (_, got)) in want.iter().zip(&got) {
         println!("{name}: {want} under the true light, {got} under the stitched one");
         crate::figures::measured("stitched constants", (got / want - 1.0).abs());
-        // What the radiance is held to.
+        // 1% is asked for. Most of what is off is bilinear reading between the stitch's texels, not the world's, which
+        // highlights notice: at a width of 1024 that is 2%, under a perfect stitch as well.
         assert!((got - want).abs() <= 0.01 * want.abs(), "{name}: {got} for {want}");
     }
 }

@@ -18,7 +18,7 @@ const UNEVEN: f64 = 0.1;
 /// Merge photographs of one view, taken with different shutter times, to a picture of radiance
 #[derive(clap::Args)]
 #[command(
-    after_help = "Each pixel is the mean of the exposures that see it, by what is known of their noise: clipped ones are left out. Told afterwards: pixels that no exposure sees, shots that are shifted against each other, and shutter times that the pictures contradict.\n\nThe response is how the camera turns light into codes. srgb is what JPEG files claim; recover finds it from the photographs themselves (Debevec and Malik 1997); gamma=G is a power, 1 for linear codes.\n\nExamples:\n  skinfit panorama merge a.png b.png c.png --seconds 1/1000,1/60,1/4 -o north.exr\n  skinfit panorama merge *.jpg --seconds 1/1000,1/250,1/60 --response recover --align -o ball.exr\n  skinfit panorama merge *.jpg --seconds 1/1000,1/250,1/60 --response recover --write-response camera.csv -o ball.exr\n  skinfit panorama merge a.png b.png --seconds 0.01,0.1 --grey-card 800,600,40,40 -o north.exr"
+    after_help = "Each pixel is the mean of the exposures that see it, by what is known of their noise: clipped ones are left out, and what shares a pixel with them, unless the photographs show that it is not spoilt. Told afterwards: pixels that no exposure sees, shots that are shifted against each other, and shutter times that the pictures contradict.\n\nThe response is how the camera turns light into codes. srgb is what JPEG files claim; recover finds it from the photographs themselves (Debevec and Malik 1997); gamma=G is a power, 1 for linear codes.\n\nExamples:\n  skinfit panorama merge a.png b.png c.png --seconds 1/1000,1/60,1/4 -o north.exr\n  skinfit panorama merge *.jpg --seconds 1/1000,1/250,1/60 --response recover --align -o ball.exr\n  skinfit panorama merge *.jpg --seconds 1/1000,1/250,1/60 --response recover --write-response camera.csv -o ball.exr\n  skinfit panorama merge a.png b.png --seconds 0.01,0.1 --grey-card 800,600,40,40 -o north.exr"
 )]
 pub(super) struct Arguments {
     /// The photographs: PNG or JPEG, of 8 or 16 bits.
@@ -135,6 +135,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     };
     merged.doubts.iter().for_each(|doubt| tell(&format!("warning: {doubt}")));
     say(times_told(&arguments.photographs, &merged).trim_end())?;
+    say(if merged.clipping_spoils {
+        "a pixel is left out as a whole where one of its channels is clipped"
+    } else {
+        "beside a clipped channel the others count: in these photographs it does not spoil them"
+    })?;
     tell_counts(&merged);
     if let Some(told) = balanced {
         say(&told)?;

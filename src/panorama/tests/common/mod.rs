@@ -33,3 +33,10 @@ pub(crate) fn panorama(file: &std::path::Path) -> Picture {
     );
     image.expect("an EXR file").layer_data.channel_data.pixels
 }
+
+/// The 8-bit code of light under sRGB's curve (IEC 61966-2-1).
+pub(crate) fn srgb_code(light: f64) -> u16 {
+    let light = light.clamp(0.0, 1.0);
+    let code = if light <= 0.003_130_8 { 12.92 * light } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 };
+    (code * 255.0).round() as u16
+}
