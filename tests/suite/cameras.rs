@@ -353,7 +353,7 @@ fn models_that_are_damaged_or_unknown_are_refused() {
         ("1 PINHOLE 640 480 nan 1 2 3\n", "not finite"),
         ("1 PINHOLE 0 480 1 1 2 3\n", "has an image of 0 x 480 pixels"),
         ("1 PINHOLE\n", "line 1: is no camera"),
-        ("# nothing\n", "refers to camera 1, which is not there"),
+        ("# nothing\n", "cameras.txt does not hold"),
     ] {
         std::fs::write(folder.path().join("cameras.txt"), cameras).unwrap();
         assert!(read().contains(words), "{}", read());
@@ -368,7 +368,7 @@ fn models_that_are_damaged_or_unknown_are_refused() {
         std::fs::write(folder.path().join("images.txt"), images).unwrap();
         assert!(read().contains(words), "{}", read());
     }
-    // Cut short anywhere, a binary model is refused.
+    // Cut short anywhere, or with more than it counts, a binary model is refused.
     write_binary(folder.path());
     for name in ["cameras.bin", "images.bin"] {
         let whole = std::fs::read(folder.path().join(name)).unwrap();
@@ -376,6 +376,9 @@ fn models_that_are_damaged_or_unknown_are_refused() {
             std::fs::write(folder.path().join(name), &whole[..length]).unwrap();
             assert!(colmap::read(folder.path()).is_err(), "{name} of {length} bytes");
         }
+        let fewer = [&[whole[0] - 1], &whole[1..]].concat();
+        std::fs::write(folder.path().join(name), fewer).unwrap();
+        assert!(read().contains("bytes more than it counts"), "{name}: {}", read());
         std::fs::write(folder.path().join(name), whole).unwrap();
     }
     // A count that promises more than there is asks for no memory.

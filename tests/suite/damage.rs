@@ -4,8 +4,8 @@
 //!   glTF file, morph targets, animations, cameras, masks; [`materials`]: what parts are drawn by, and the skin's own maps;
 //!   [`cameras`]: what other programs say of theirs, responses
 //!
-//! What the program makes of damaged files, and what it leaves behind, is in `cli::damaged`; states of fits are in
-//! `fits::damaged`.
+//! What the program makes of damaged files, and what it leaves behind, is in `cli::damaged` and `cli::damaged_captures`; states
+//! of fits are in `fits::damaged`.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may stop where the tests themselves would")]
 

@@ -133,6 +133,10 @@ fn cameras_of_path_traced_heads_end_at_the_same_place_from_anywhere_near() {
     crate::figures::measured("registration traced end", found[0]);
     assert!(start[0] > 5.0 && end[0] < 0.1, "{start:?} -> {end:?}");
     assert!(bias[0] < 0.1 && found[0] < 0.1, "{bias:?} {found:?}");
+    // Focal length and distance are told apart by perspective alone, to a percent or two: at the image's border, 192 pixels
+    // from its middle, what stands a fifth of the distance nearer is off by 192 x 0.2 x 1% = 0.4 pixels then. From either start
+    // that is the same, but for what is left of the built-in scene's cameras.
+    assert!(bias[1] < 1.0 && found[1] < 1.0 && end[1] < 0.3, "{bias:?} {found:?} {end:?}");
 }
 
 #[test]

@@ -9,7 +9,7 @@ use glam::{DMat4, DVec3};
 use skinfit::model::effects::{Effect, Effects};
 use skinfit::prepare::{Loaded, PrepareOptions};
 use skinfit::scene::Scene;
-use skinfit::scene::view::Target;
+use skinfit::scene::view::{Camera, Target};
 
 use crate::common;
 
@@ -36,10 +36,15 @@ static TRUE: LazyLock<(tempfile::TempDir, Loaded)> = LazyLock::new(|| {
     (folder, loaded)
 });
 
-fn with(mistake: impl FnOnce(&mut Scene)) -> Vec<String> {
-    let mut loaded = TRUE.1.clone();
+/// What is said of a scene with a mistake in it.
+fn said_with(loaded: &Loaded, mistake: impl FnOnce(&mut Scene)) -> Vec<String> {
+    let mut loaded = loaded.clone();
     mistake(&mut loaded.scene);
     said(loaded)
+}
+
+fn with(mistake: impl FnOnce(&mut Scene)) -> Vec<String> {
+    said_with(&TRUE.1, mistake)
 }
 
 /// The number behind these words.
@@ -47,6 +52,29 @@ fn number_after(text: &str, words: &str) -> f64 {
     let at = text.find(words).unwrap_or_else(|| panic!("{words:?} is not in {text:?}")) + words.len();
     let number: String = text[at..].chars().take_while(|c| c.is_ascii_digit() || *c == '.').collect();
     number.parse().unwrap()
+}
+
+/// Move a camera in its own axes; by how many pixels to the right and down the place was seen elsewhere before.
+fn moved(camera: &mut Camera, motion: DMat4, place: DVec3) -> [f64; 2] {
+    let before = camera.project(place);
+    camera.world_to_camera = motion * camera.world_to_camera;
+    let after = camera.project(place);
+    [before.0 - after.0, before.1 - after.1]
+}
+
+/// A target is said to lie elsewhere by so many pixels to the right and down, but for some.
+fn check_told(text: &str, pixels: [f64; 2], some: f64) {
+    let (_, told) = text.split_once("the target's lies ").unwrap_or_else(|| panic!("{text}"));
+    let words: Vec<&str> = told.split([' ', ',', ';']).collect();
+    // A number, "pixels" and its side; "and"; the same again.
+    let signed = |at: usize| {
+        let size: f64 = words[at].parse().unwrap();
+        if ["left", "up"].contains(&words[at + 2]) { -size } else { size }
+    };
+    for (told, pixels) in [signed(0), signed(4)].into_iter().zip(pixels) {
+        // Perspective: what lies nearer moves further, by a twentieth here.
+        assert!((told - pixels).abs() < 0.05 * pixels.abs() + some, "{text}: {pixels}");
+    }
 }
 
 /// Rows and pixels of a target in another order.
@@ -124,23 +152,11 @@ fn displaced_cameras_are_noticed_and_by_how_much() {
         let aside = DMat4::from_translation(DVec3::new(right, up, 0.0));
         let mut pixels = [0.0; 2];
         let told = with(|scene| {
-            let camera = &mut scene.views[i].camera;
             // Of a point at the head's distance.
-            let point = |camera: &skinfit::scene::view::Camera| camera.project(DVec3::new(0.0, -0.034, 0.0));
-            let before = point(camera);
-            camera.world_to_camera = aside * camera.world_to_camera;
-            let after = point(camera);
-            pixels = [before.0 - after.0, before.1 - after.1];
+            pixels = moved(&mut scene.views[i].camera, aside, DVec3::new(0.0, -0.034, 0.0));
         });
         assert_eq!(told.len(), 1, "{told:#?}");
-        let text = &told[0];
-        let across = number_after(text, "the target's lies ");
-        // Perspective: what lies nearer moves further, by a twentieth here.
-        assert!((across - pixels[0].abs()).abs() < 0.05 * pixels[0].abs() + 1.0, "{text}: {pixels:?}");
-        // Of next to nothing the side is chance.
-        let down =
-            number_after(text, if text.contains("pixels left and ") { "left and " } else { "right and " });
-        assert!((down - pixels[1].abs()).abs() < 0.05 * pixels[1].abs() + 1.5, "{text}: {pixels:?}");
+        check_told(&told[0], pixels, 1.5);
     }
 }
 
@@ -155,32 +171,23 @@ fn other_poses_are_noticed() {
     }
 }
 
-/// A scene of path-traced targets, its silhouettes' effects, and what is said with a mistake in it.
-fn traced(scene: &str, effects: &[Effect], mistake: impl FnOnce(&mut Scene)) -> Option<Vec<String>> {
-    let mut loaded = read(&common::data()?.join(scene), effects);
-    mistake(&mut loaded.scene);
-    Some(said(loaded))
-}
-
 #[test]
 fn mistakes_are_noticed_on_path_traced_heads() {
-    let forest = |mistake: &dyn Fn(&mut Scene)| traced("lps_forest/scene.toml", &[], mistake);
+    let Some(data) = common::data() else { return };
+    let loaded = read(&data.join("lps_forest/scene.toml"), &[]);
+    let forest = |mistake: &dyn Fn(&mut Scene)| said_with(&loaded, mistake);
     for (a, b) in [(0, 1), (1, 2), (0, 2)] {
-        let Some(told) = forest(&|scene| {
-            let targets = [a, b].map(|i: usize| scene.views[i].target.take());
-            let [first, second] = targets;
+        let told = forest(&|scene| {
+            let [first, second] = [a, b].map(|i: usize| scene.views[i].target.take());
             (scene.views[a].target, scene.views[b].target) = (second, first);
-        }) else {
-            return;
-        };
+        });
         assert_eq!(told.len(), 2, "{told:#?}");
         assert!(told.iter().all(|told| told.contains("swapped")), "{told:#?}");
     }
     for i in 0..3 {
         for factor in [0.95, 1.05] {
-            let mut fov = 0.0;
-            let told = forest(&|scene| scene.views[i].camera.fov_y *= factor).unwrap();
-            traced("lps_forest/scene.toml", &[], |scene| fov = scene.views[i].camera.fov_y.to_degrees());
+            let fov = loaded.scene.views[i].camera.fov_y.to_degrees();
+            let told = forest(&|scene| scene.views[i].camera.fov_y *= factor);
             assert_eq!(told.len(), 1, "{i} {factor}: {told:#?}");
             let named = number_after(&told[0], "with fov_y_degrees = ");
             crate::figures::measured("silhouettes traced field of view", (named / fov - 1.0).abs());
@@ -193,9 +200,52 @@ fn mistakes_are_noticed_on_path_traced_heads() {
         let told = forest(&|scene| {
             let width = scene.views[i].camera.width as usize;
             reordered(scene.views[i].target.as_mut().unwrap(), width, |x, y| y * width + width - 1 - x);
-        })
-        .unwrap();
+        });
         assert_eq!(told.len(), 1, "{i}: {told:#?}");
+    }
+    // From another side.
+    for (i, angle) in [(0, 25.0_f64), (1, -30.0), (2, -25.0)] {
+        let turn = DMat4::from_rotation_y(angle.to_radians());
+        let told = forest(&|scene| scene.views[i].camera.world_to_camera *= turn);
+        assert_eq!(told.len(), 1, "{i} {angle}: {told:#?}");
+    }
+}
+
+#[test]
+fn displaced_and_turned_cameras_are_noticed_on_path_traced_heads() {
+    let Some(data) = common::data() else { return };
+    // A place in each head, and about half of its width.
+    let heads: [(&str, &[Effect], DVec3, f64); 2] = [
+        ("lps_forest/scene.toml", &[], DVec3::new(0.0, 1.2, 0.0), 1.5),
+        ("mh_portrait/scene.toml", &[Effect::Skin], DVec3::new(0.0, 0.125, 0.0), 0.08),
+    ];
+    for (scene, effects, place, half) in heads {
+        let loaded = read(&data.join(scene), effects);
+        let aside = |right: f64, up: f64| DMat4::from_translation(half * DVec3::new(right, up, 0.0));
+        let turn = 2_f64.to_radians();
+        let motions = [
+            aside(1.0, 0.0),
+            aside(0.0, 1.0),
+            aside(-0.7, -0.7),
+            DMat4::from_rotation_y(turn),
+            DMat4::from_rotation_x(-turn),
+        ];
+        for i in 0..loaded.scene.views.len() {
+            for motion in motions {
+                let mut pixels = [0.0; 2];
+                let told = said_with(&loaded, |scene| {
+                    pixels = moved(&mut scene.views[i].camera, motion, place);
+                });
+                assert_eq!(told.len(), 1, "{scene}, view {i}, {motion}: {told:#?}");
+                // From aside by half a head the head is seen turned by 4 degrees, of which no shift is.
+                check_told(&told[0], pixels, 3.0);
+            }
+            let rolled = DMat4::from_rotation_z(5_f64.to_radians());
+            let told = said_with(&loaded, |scene| {
+                moved(&mut scene.views[i].camera, rolled, place);
+            });
+            assert!(told.len() == 1 && told[0].contains("no shift and no scale"), "{scene}, {i}: {told:#?}");
+        }
     }
 }
 

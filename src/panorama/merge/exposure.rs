@@ -71,6 +71,21 @@ pub enum ExposureError {
     },
 }
 
+impl ExposureError {
+    /// Which exposure is wrong; `None` where it is how many there are.
+    #[must_use]
+    pub const fn exposure(&self) -> Option<usize> {
+        match *self {
+            Self::None | Self::TooMany(_) => None,
+            Self::Picture { exposure, .. }
+            | Self::Sides { exposure, .. }
+            | Self::Seconds { exposure, .. }
+            | Self::Most { exposure, .. }
+            | Self::Code { exposure, .. } => Some(exposure),
+        }
+    }
+}
+
 /// A picture as the camera wrote it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Exposure {

@@ -5,7 +5,7 @@ use serde_json::Value;
 use super::sandbox::Sandbox;
 
 /// The pictures of a sequence, in their order.
-fn frames(sandbox: &Sandbox, stem: &str) -> Vec<Vec<[f32; 3]>> {
+pub(super) fn frames(sandbox: &Sandbox, stem: &str) -> Vec<Vec<[f32; 3]>> {
     (0..)
         .map(|i| format!("{stem}.{i:04}.exr"))
         .take_while(|name| sandbox.path(name).exists())

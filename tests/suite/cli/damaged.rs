@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 use super::sandbox::{Sandbox, TRUTH, mesh};
 use crate::damage::tree::{json_text, toml_text, tree_damage};
 use crate::damage::{Damage, damage};
+use crate::fixtures::read_exr;
 use crate::imported::metashape::metashape_file;
 use crate::imported::opencv::{STORED, XML};
 
@@ -40,8 +41,21 @@ fn toml_tree(text: &str) -> Value {
 }
 
 /// Run the program on each of `damaged` in the place of `file`; what it writes is `output`, or below it. Some must be
-/// refused.
+/// refused, by the file's name.
 fn check(sandbox: &Sandbox, file: &str, damaged: &[Vec<u8>], arguments: &[&str], output: &str) {
+    let refused = check_named(sandbox, file, file, damaged, arguments, output);
+    assert!(refused > 0, "{file}: nothing was refused");
+}
+
+/// The same; how many were refused, which has to say `named`.
+pub(super) fn check_named(
+    sandbox: &Sandbox,
+    file: &str,
+    named: &str,
+    damaged: &[Vec<u8>],
+    arguments: &[&str],
+    output: &str,
+) -> usize {
     let whole = sandbox.read(file);
     let kept = sandbox.path(output).exists().then(|| sandbox.files());
     let (mut refused, mut taken) = (0, 0);
@@ -54,7 +68,7 @@ fn check(sandbox: &Sandbox, file: &str, damaged: &[Vec<u8>], arguments: &[&str],
         match ran.code {
             Some(2) => {
                 refused += 1;
-                ran.refused(&[file]);
+                ran.refused(&[named]);
                 assert!(sandbox.files() == before, "refused, and files were left or changed:\n{said}");
             }
             Some(0 | 1) => {
@@ -74,7 +88,7 @@ fn check(sandbox: &Sandbox, file: &str, damaged: &[Vec<u8>], arguments: &[&str],
     }
     sandbox.write(file, &whole);
     println!("{file}: {refused} refused, {taken} taken of {}", damaged.len());
-    assert!(refused > 0, "{file}: nothing was refused");
+    refused
 }
 
 fn remove(path: &Path) {
@@ -95,6 +109,14 @@ fn whole_files(sandbox: &Sandbox, said: &str) {
                 let report: Value =
                     serde_json::from_slice(&bytes).unwrap_or_else(|e| panic!("{name}: {e}\n{said}"));
                 assert!(report["loss"]["end"].as_f64().is_some_and(f64::is_finite), "{report}\n{said}");
+            }
+            Some("toml") if name == "made.toml" => {
+                let text = String::from_utf8(bytes).unwrap_or_else(|e| panic!("{name}: {e}\n{said}"));
+                assert!(text.parse::<toml::Table>().is_ok(), "{text}\n{said}");
+            }
+            Some("exr") if ["merged.exr", "sky.exr"].contains(&name.as_str()) => {
+                let finite = read_exr(&path).planes.values().flatten().all(|value| value.is_finite());
+                assert!(finite, "{name}:\n{said}");
             }
             Some("html") => assert!(bytes.ends_with(b"</html>\n"), "{name}:\n{said}"),
             Some("png") => {

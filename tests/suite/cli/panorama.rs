@@ -312,10 +312,10 @@ fn what_is_no_photograph_or_no_shot_is_refused() {
     sandbox.write("small.png", &encode(RgbImage::new(4, 4), ImageFormat::Png));
     let merge = |more: &[&str]| sandbox.run(&[&["panorama", "merge", "-o", "made.exr"], more].concat());
     merge(&["a.png", "--seconds", "1,2"]).refused(&["--seconds: 2 for 1 photographs"]);
-    merge(&["none.png", "--seconds", "1"]).refused(&["none.png: cannot be read"]);
-    merge(&["env.exr", "--seconds", "1"]).refused(&["env.exr"]);
+    merge(&["none.png", "--seconds", "1"]).refused(&["none.png: there is no such file"]);
+    merge(&["env.exr", "--seconds", "1"]).refused(&["env.exr: holds radiance, which is merged already"]);
     merge(&["scene.toml", "--seconds", "1"]).refused(&["scene.toml"]);
-    merge(&["a.png", "small.png", "--seconds", "1,2"]).refused(&["4"]);
+    merge(&["a.png", "small.png", "--seconds", "1,2"]).refused(&["small.png: Exposure 1 is 4 x 4 pixels"]);
     merge(&["a.png", "--seconds", "1", "--grey-card", "10,10,10,10"]).refused(&["10"]);
     sandbox
         .run(&["panorama", "merge", "a.png", "--seconds", "1", "-o", "made.png"])
@@ -338,8 +338,8 @@ fn what_is_no_photograph_or_no_shot_is_refused() {
     ]);
     stitch(&format!("{shot}field_of_view_degrees = 180\n").replace("equidistant", "mirror_ball"))
         .refused(&["shot 0: field_of_view_degrees is a fisheye's, and its lens is a mirror ball"]);
-    stitch(&format!("{shot}field_of_view_degrees = 900\n")).refused(&["900"]);
+    stitch(&format!("{shot}field_of_view_degrees = 900\n")).refused(&["shots.toml: Shot 0: ", "900"]);
     stitch(&format!("{shot}field_of_view_degrees = 180\n").replace("env.exr", "none.exr"))
-        .refused(&["none.exr"]);
+        .refused(&["shots.toml: shot 0: none.exr: there is no such file"]);
     assert!(!sandbox.path("made.exr").exists());
 }

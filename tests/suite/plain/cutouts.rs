@@ -25,7 +25,7 @@ const MANY: u32 = 16_384;
 pub(super) type Alpha = fn(u32, u32) -> u8;
 
 /// A white picture whose alpha is that, 16 texels a side.
-fn picture(alpha: impl Fn(u32, u32) -> u8) -> Vec<u8> {
+pub(super) fn picture(alpha: impl Fn(u32, u32) -> u8) -> Vec<u8> {
     let picture = image::RgbaImage::from_fn(16, 16, |x, y| image::Rgba([255, 255, 255, alpha(x, y)]));
     encode(picture, image::ImageFormat::Png)
 }
@@ -245,6 +245,15 @@ pub(super) fn traced_and_drawn(baked: &Baked) -> [Option<f32>; 2] {
     [Some(beside_the_open(&on_cpu(baked, 8))), drawn]
 }
 
+/// How far what [`traced_and_drawn`] finds may be from `want`: four standard deviations of as many coins as there are rays, and
+/// as many as four fragments a pixel ask of texels, two of their own each; of whole and clear places, where all fall alike, the
+/// roundings of shading.
+pub(super) fn tolerances(want: f32) -> [f32; 2] {
+    let pixels = (6 * FINER * FINER) as f32;
+    let coins = [64.0 * pixels, 4.0 * 2.0 * pixels];
+    coins.map(|coins| 4.0 * (want * (1.0 - want) / coins).sqrt() + 1e-3)
+}
+
 #[test]
 fn a_lamp_shines_through_holes_by_rays_and_by_shadow_maps() {
     let cases: [(&str, Alpha, f32); 6] = [
@@ -256,13 +265,8 @@ fn a_lamp_shines_through_holes_by_rays_and_by_shadow_maps() {
         ("BLEND", |_, _| 128, 0.5),
     ];
     for (mode, alpha, want) in cases {
-        // Four standard deviations of as many coins as there are rays, and as many as four fragments a pixel ask of texels,
-        // two of their own each. Of whole and clear places all are alike: what is beside 1 there is the roundings of shading.
-        let pixels = (6 * FINER * FINER) as f32;
-        let coins = [64.0 * pixels, 4.0 * 2.0 * pixels];
         let found = traced_and_drawn(&lit(&card(mode), alpha, |_| {}));
-        for ((found, coins), how) in found.into_iter().zip(coins).zip(["rays", "shadow map"]) {
-            let tolerance = if want == 0.5 { 4.0 * 0.5 / coins.sqrt() } else { 1e-3 };
+        for ((found, tolerance), how) in found.into_iter().zip(tolerances(want)).zip(["rays", "shadow map"]) {
             let Some(found) = found else { continue };
             assert!((found - want).abs() < tolerance, "{mode}, {how}: {found} is not {want}");
         }

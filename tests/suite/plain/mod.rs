@@ -4,6 +4,7 @@
 
 mod cutouts;
 mod drawn;
+mod gloss;
 mod pictures;
 mod posed;
 mod shapes;

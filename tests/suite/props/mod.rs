@@ -1,4 +1,4 @@
-//! Ten small characters and props of the kinds of Khronos' glTF samples, made by code, each of which shows something that
+//! Small characters and props of the kinds of Khronos' glTF samples, made by code, each of which shows something that
 //! the reader of meshes claims to read; drawn by the CPU engine and compared with what they looked like.
 //!
 //! `tests/golden/props.json` says that nothing has moved them, not that they are right: what has to hold by glTF's
@@ -11,6 +11,7 @@ mod character;
 pub(crate) mod file;
 mod moved;
 mod surfaces;
+mod triangles;
 mod vertices;
 
 use std::collections::BTreeMap;
@@ -94,8 +95,8 @@ impl Prop {
     }
 }
 
-/// The ten.
-fn all() -> [Prop; 10] {
+/// All of them.
+fn all() -> [Prop; 12] {
     [
         surfaces::box_of_factors(),
         surfaces::textured_boxes(),
@@ -103,9 +104,11 @@ fn all() -> [Prop; 10] {
         vertices::vertex_colours(),
         vertices::two_sets(),
         surfaces::glowing_box(),
+        surfaces::strong_glows(),
         moved::skinned_rod(),
         moved::morphed_cube(),
         vertices::packed_and_mirrored(),
+        triangles::strips_and_fans(),
         character::character(),
     ]
 }

@@ -1,5 +1,5 @@
 //! Materials: a box with metallic-roughness factors, textured boxes whose pictures repeat, mirror and end, panels that are
-//! opaque, have holes or blend, and a box that glows by a picture.
+//! opaque, have holes or blend, a box that glows by a picture, and panels that glow by strengths.
 
 use glam::{DQuat, DVec3};
 use image::{ImageFormat, Rgb, RgbImage, Rgba, RgbaImage};
@@ -9,7 +9,7 @@ use skinfit::render::tonemap::srgb_decode;
 use super::file::{File, Shape};
 use super::{CLAMP, MIRROR, Prop, REPEAT, SIZE, Sky, at, four, mirror, mirror_of, nearest, seen_at, texel};
 use crate::plain::close;
-use crate::scene_folder::encode;
+use crate::scene_folder::{encode, png};
 
 /// How the box of factors is turned: a corner comes forward, and three of its sides are seen.
 fn turn() -> DQuat {
@@ -204,7 +204,7 @@ fn layers_blend_by_their_distance() {
 /// Greens of the glow's four texels, left to right, by sRGB's curve.
 const GLOW: [u8; 4] = [0, 90, 188, 255];
 /// The factor on them.
-const STRENGTH: [f32; 3] = [1.0, 0.5, 0.0];
+const GLOW_FACTOR: [f32; 3] = [1.0, 0.5, 0.0];
 
 /// A grey box whose front glows by a picture, which is smooth between its texels.
 pub(super) fn glowing_box() -> Prop {
@@ -213,7 +213,7 @@ pub(super) fn glowing_box() -> Prop {
     let picture = RgbImage::from_fn(4, 1, |x, _| Rgb([GLOW[x as usize]; 3]));
     let texture = file.texture(&encode(picture, ImageFormat::Png), json!({}));
     let glow = file.material(json!({
-        "name": "Glow", "emissiveFactor": STRENGTH, "emissiveTexture": {"index": texture},
+        "name": "Glow", "emissiveFactor": GLOW_FACTOR, "emissiveTexture": {"index": texture},
         "pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0.8, "baseColorFactor": [0.3, 0.3, 0.3, 1]},
     }));
     file.put(&Shape::cuboid([0.8, 0.6, 0.2]), glow, [0.0, 0.0, -0.2]);
@@ -236,8 +236,48 @@ fn a_glow_is_its_factor_times_its_picture_whatever_the_light() {
         let [x, y] = [4 + column, SIZE / 2];
         let (lit, unlit) = (at(&bright, x, y), at(&dark, x, y));
         let got = [0, 1, 2].map(|c| lit[c] - unlit[c]);
-        let want = STRENGTH.map(|factor| factor * glow);
+        let want = GLOW_FACTOR.map(|factor| factor * glow);
         // Both pictures have the same rays: what is left is f32 of texture coordinates and of sums.
         assert!(close(got, want, 1e-4), "column {column}: {got:?} is not {want:?}");
+    }
+}
+
+/// Where panels that glow stand beside one another, what KHR_materials_emissive_strength says of each, and the strength that
+/// this is: without a number it is 1.
+fn strengths() -> [(f64, Value, f32); 4] {
+    let named = |strength: Value| json!({"KHR_materials_emissive_strength": strength});
+    [
+        (-0.7, json!({}), 1.0),
+        (-0.25, named(json!({"emissiveStrength": 5})), 5.0),
+        (0.25, named(json!({"emissiveStrength": 0.25})), 0.25),
+        (0.7, named(json!({})), 1.0),
+    ]
+}
+
+/// Black panels that glow by a factor, a picture and a strength.
+pub(super) fn strong_glows() -> Prop {
+    let mut file = File::new();
+    file.json["extensionsUsed"] = json!(["KHR_materials_emissive_strength"]);
+    file.backdrop();
+    let picture = file.texture(&png(4, 4, [GLOW[2]; 3]), json!({}));
+    for (x, extensions, _) in strengths() {
+        let glow = file.material(json!({
+            "name": "Glow", "emissiveFactor": GLOW_FACTOR, "emissiveTexture": {"index": picture},
+            "extensions": extensions, "pbrMetallicRoughness": mirror(&json!([0, 0, 0, 1])),
+        }));
+        file.put(&Shape::panel(0.2, 0.6), glow, [x, 0.0, 0.0]);
+    }
+    Prop::new("strong_glows", file)
+}
+
+#[test]
+fn a_strength_multiplies_what_glows_beyond_one() {
+    let image = strong_glows().under(Sky::Even).image();
+    for (x, extensions, strength) in strengths() {
+        let [column, row] = seen_at([x, 0.05]);
+        let got = at(&image, column, row);
+        let want = GLOW_FACTOR.map(|factor| strength * factor * srgb_decode(f32::from(GLOW[2]) / 255.0));
+        // Facing it, a black mirror shows nothing of the sky; a picture of one colour is that colour, in f32.
+        assert!(close(got, want, 1e-5), "{extensions}: {got:?} is not {want:?}");
     }
 }

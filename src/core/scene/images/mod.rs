@@ -3,6 +3,7 @@
 //! - `open_exr`, `raster`: the decoders; `sampled`, `chroma` and `dwa` are parts of the former
 //! - `chromaticities`: other primaries than Rec.709's
 //! - `claims`: what PNG and JPEG files say of their colours; `code_points` and `icc` read it, `space` is what comes of it
+//! - `codes`: a photograph's own, whatever light they stand for
 //! - `response`: a camera's own curve, where a view has one
 //! - `target`: images to be matched, and their masks
 //!
@@ -13,6 +14,7 @@ mod chroma;
 mod chromaticities;
 mod claims;
 mod code_points;
+mod codes;
 mod dwa;
 mod icc;
 #[cfg(test)]
@@ -34,6 +36,7 @@ use rayon::prelude::*;
 use self::chromaticities::Chromaticities;
 use self::claims::Claims;
 use self::space::Space;
+pub use codes::{Codes, codes};
 pub(super) use response::Response;
 pub(super) use target::{Seen, haze, target};
 
@@ -78,7 +81,7 @@ impl Opened<'_> {
 
     /// A decoder's own complaint.
     fn damaged(&self, kind: &str, reason: impl std::fmt::Display) -> SceneError {
-        let reason = reason.to_string().replace('\n', " ");
+        let reason = reason.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
         let reason = reason.trim_end_matches('.');
         self.error(
             format!("cannot be read as {kind}: {reason}"),

@@ -66,11 +66,9 @@ pub fn read(folder: &Path) -> Result<Vec<ImportedView>, SceneError> {
     let view = |image: Posed| {
         let picture = PathBuf::from(&image.name);
         let intrinsics = cameras.get(&image.camera).ok_or_else(|| {
-            damaged(
-                &of_images,
-                format!("image {}", image.name),
-                format!("refers to camera {}, which is not there", image.camera),
-            )
+            let what =
+                format!("refers to camera {}, which {} does not hold", image.camera, of_cameras.display());
+            damaged(&of_images, format!("image {}", image.name), what)
         })?;
         let [w, x, y, z] = image.quaternion;
         let rotation = DQuat::from_xyzw(x, y, z, w);
@@ -218,6 +216,14 @@ impl<'a> Bytes<'a> {
         Ok(array)
     }
 
+    /// Refuse what is left: a count that is too small hides all that is behind it.
+    fn end(&self) -> Result<(), SceneError> {
+        match self.rest.len() {
+            0 => Ok(()),
+            left => Err(damaged(self.path, "its end", format!("has {left} bytes more than it counts"))),
+        }
+    }
+
     fn u32(&mut self) -> Result<u32, SceneError> {
         self.array().map(u32::from_le_bytes)
     }
@@ -244,6 +250,7 @@ fn binary_cameras(path: &Path, bytes: &[u8]) -> Result<BTreeMap<u32, Intrinsics>
         let numbers: Vec<f64> = (0..count).map(|_| bytes.f64()).collect::<Result<_, _>>()?;
         cameras.insert(id, intrinsics(path, &place, name, size, &numbers)?);
     }
+    bytes.end()?;
     Ok(cameras)
 }
 
@@ -266,5 +273,6 @@ fn binary_images(path: &Path, bytes: &[u8]) -> Result<Vec<Posed>, SceneError> {
         bytes.take(points.ok_or_else(|| damaged(path, format!("image {i}"), "is cut short"))?)?;
         images.push(Posed { quaternion, translation, camera, name });
     }
+    bytes.end()?;
     Ok(images)
 }

@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use skinfit_panorama::grey_card::{self, Normalise, REFLECTANCE, Rectangle};
-use skinfit_panorama::merge::{Exposure, MergeOptions, Merged, Weighting, merge};
+use skinfit_panorama::merge::{
+    Exposure, ExposureError, MergeOptions, Merged, Weighting, check_exposures, merge,
+};
 use skinfit_panorama::response::{Response, SMOOTHNESS, recover};
 
 use super::pictures;
@@ -114,6 +116,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     let each = arguments.photographs.iter().zip(&arguments.seconds);
     let exposures: Vec<Exposure> =
         each.map(|(path, &seconds)| pictures::exposure(path, seconds)).collect::<Result<_, _>>()?;
+    check_exposures(&exposures).map_err(|error| refused(&arguments.photographs, &error))?;
     let primaries = pictures::primaries(&arguments.photographs)?;
     let response = match &arguments.response {
         Asked::Given(response) => response.clone(),
@@ -153,6 +156,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     pictures::write(&arguments.output, &merged.picture)?;
     say(&format!("wrote {}", arguments.output.display()))?;
     Ok(Exit::Done)
+}
+
+/// What is wrong with an exposure is its photograph's.
+fn refused(photographs: &[PathBuf], error: &ExposureError) -> Refusal {
+    match error.exposure().and_then(|exposure| photographs.get(exposure)) {
+        Some(path) => Refusal::new(format!("{}: {error}", path.display())),
+        None => Refusal::new(error.to_string()),
+    }
 }
 
 /// Each photograph's shutter time, as told and by the pictures.

@@ -3,52 +3,21 @@
 use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DVec3};
-use image::{DynamicImage, ImageReader};
 use skinfit_panorama::merge::Exposure;
 use skinfit_panorama::picture::Picture;
 
 use crate::cli::{Refusal, tell};
 use crate::render::files::{ImageOptions, write_exr};
 use crate::render::image::Image;
-use crate::scene::images;
+use crate::scene::images::{self, Codes};
 
 /// Primaries whose matrices differ by no more are the same: as profiles of one space do.
 const SAME_PRIMARIES: f64 = 1e-3;
-/// No photograph above this many pixels is read.
-const MOST_PIXELS: u64 = 1 << 28;
 
 /// A photograph's codes, taken with that exposure.
 pub(super) fn exposure(path: &Path, seconds: f64) -> Result<Exposure, Refusal> {
-    let refuse = |what: String| {
-        Refusal::new(format!("{}: {what}. Give photographs as PNG or JPEG, of 8 or 16 bits.", path.display()))
-    };
-    let open = || ImageReader::open(path)?.with_guessed_format();
-    let reader = open().map_err(|error| refuse(format!("cannot be read: {error}")))?;
-    let (width, height) = open()
-        .map_err(|error| refuse(format!("cannot be read: {error}")))?
-        .into_dimensions()
-        .map_err(|error| refuse(format!("is no picture: {error}")))?;
-    if u64::from(width) * u64::from(height) > MOST_PIXELS {
-        return Err(refuse(format!(
-            "is {width} x {height} pixels, more than the {MOST_PIXELS} that are read"
-        )));
-    }
-    let image = reader
-        .decode()
-        .map_err(|error| refuse(format!("is no picture: {}", one_line(&error.to_string()))))?;
-    let (codes, most) = match image {
-        DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => {
-            return Err(refuse("holds radiance, which is merged already".to_owned()));
-        }
-        deep @ (DynamicImage::ImageRgb16(_)
-        | DynamicImage::ImageRgba16(_)
-        | DynamicImage::ImageLuma16(_)
-        | DynamicImage::ImageLumaA16(_)) => {
-            (deep.into_rgb16().pixels().map(|pixel| pixel.0).collect(), u16::MAX)
-        }
-        other => (other.into_rgb8().pixels().map(|pixel| pixel.0.map(u16::from)).collect(), 255),
-    };
-    Ok(Exposure { width: width as usize, height: height as usize, codes, most, seconds })
+    let Codes { width, height, rgb, most } = images::codes(path)?;
+    Ok(Exposure { width, height, codes: rgb, most, seconds })
 }
 
 /// From the primaries that photographs' profiles name to Rec.709's, where they are others: the curve of their codes is the
@@ -88,10 +57,6 @@ pub(super) fn place(path: &Path) -> PathBuf {
         folder.unwrap_or_default().join(path.file_name().unwrap_or_default())
     };
     path.canonicalize().unwrap_or_else(|_| within(path))
-}
-
-fn one_line(text: &str) -> String {
-    text.replace(char::is_control, " ").trim_end_matches('.').to_owned()
 }
 
 /// A picture of radiance: EXR or HDR; PNG and JPEG are read by their profile, or as sRGB.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DQuat, DVec2, DVec3};
 use skinfit_panorama::lens::{Fisheye, Lens, MirrorBall, Projection};
-use skinfit_panorama::stitch::{Shot, StitchOptions, stitch};
+use skinfit_panorama::stitch::{Shot, StitchError, StitchOptions, stitch};
 
 use super::pictures;
 use crate::cli::columns::aligned;
@@ -88,7 +88,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         gains: !arguments.no_gains,
         fill: !arguments.no_fill,
     };
-    let stitched = stitch(&shots, &options)?;
+    let stitched = stitch(&shots, &options).map_err(|error| refused(&arguments.shots, &error))?;
     stitched.doubts.iter().for_each(|doubt| tell(&format!("warning: {doubt}")));
     let head = ["shot", "turned by, degrees", "times", "alike"].map(str::to_owned);
     let rows = names.iter().enumerate().map(|(i, name)| {
@@ -104,6 +104,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     pictures::write(&arguments.output, &stitched.panorama)?;
     say(&format!("wrote {}", arguments.output.display()))?;
     Ok(Exit::Done)
+}
+
+/// What a stitch refuses is the file's, but for what the command line says.
+fn refused(path: &Path, error: &StitchError) -> Refusal {
+    match error {
+        StitchError::Width(_) | StitchError::Feather(_) => Refusal::new(error.to_string()),
+        _ => Refusal::new(format!("{}: {error}", path.display())),
+    }
 }
 
 /// The shots of a file, and what each picture is called.
@@ -126,7 +134,8 @@ fn read(path: &Path) -> Result<(Vec<String>, Vec<Shot>), Refusal> {
             of_shot("towards and up are no two directions. Give up across towards.".to_owned())
         })?;
         let lens = lens(table).map_err(of_shot)?;
-        let picture = pictures::radiance(&folder.join(&table.file))?;
+        let picture =
+            pictures::radiance(&folder.join(&table.file)).map_err(|refusal| of_shot(refusal.words))?;
         shots.push(Shot { picture, lens, orientation, gain: table.gain });
     }
     let names = file.shot.iter().map(|table| table.file.display().to_string()).collect();
