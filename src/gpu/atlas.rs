@@ -65,7 +65,7 @@ impl Atlas {
     pub(super) fn new(gpu: &Gpu, plan: &Plan, uploads: &mut Uploads) -> Result<Option<Self>, GpuError> {
         let Some(size) = plan.facts.atlas.filter(|_| !plan.passes.is_empty()) else { return Ok(None) };
         check(gpu, size, uploads)?;
-        let uvs = &uploads.content().scene.mesh.uvs;
+        let uvs = uploads.content().scene.mesh.atlas_uvs();
         let texels = Texels::new(gpu, uvs, uploads.triangles().of_skin(), size)?;
         let mut atlas = Self {
             levels: HashMap::new(),
@@ -184,7 +184,7 @@ fn check(gpu: &Gpu, size: u32, uploads: &Uploads) -> Result<(), GpuError> {
         return Err(GpuError::TextureSize { adapter, what, width: side, height: side, limit, of });
     }
     // What is not skin has texture coordinates for its own pictures.
-    let uvs = &uploads.content().scene.mesh.uvs;
+    let uvs = uploads.content().scene.mesh.atlas_uvs();
     let skin = uploads.triangles().of_skin().as_flattened();
     let uvs: Vec<_> = skin.iter().filter_map(|&vertex| uvs.get(vertex as usize).copied()).collect();
     match tile_outside_atlas(&uvs) {

@@ -38,7 +38,7 @@ pub(super) fn vertex_format(attribute: Attribute) -> VertexFormat {
         Attribute::Chart => VertexFormat::Float32,
         Attribute::Position | Attribute::Normal | Attribute::Corner => VertexFormat::Float32x3,
         Attribute::Tangent | Attribute::Weights => VertexFormat::Float32x4,
-        Attribute::Uv => VertexFormat::Float32x2,
+        Attribute::Uv | Attribute::AtlasUv => VertexFormat::Float32x2,
         Attribute::Occlusion => VertexFormat::Float32,
         Attribute::Joints => VertexFormat::Uint32x4,
         Attribute::Field(field) => match field.info().numbers {

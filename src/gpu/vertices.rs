@@ -27,6 +27,7 @@ pub(super) fn attribute(
         Attribute::Normal => floats(mesh.normals.iter().flat_map(Vec3::to_array).collect()),
         Attribute::Tangent => floats(mesh.tangents.iter().flat_map(Vec4::to_array).collect()),
         Attribute::Uv => floats(mesh.uvs.iter().flat_map(Vec2::to_array).collect()),
+        Attribute::AtlasUv => floats(mesh.atlas_uvs().iter().flat_map(Vec2::to_array).collect()),
         Attribute::Occlusion => floats(occlusion.map_or_else(|| vec![1.0; count], |o| o.base.clone())),
         Attribute::Joints => {
             let joints: Vec<u32> = (0..count).flat_map(|i| influences(mesh, i).0).collect();
@@ -35,7 +36,7 @@ pub(super) fn attribute(
         Attribute::Weights => floats((0..count).flat_map(|i| influences(mesh, i).1).collect()),
         Attribute::Field(of) => floats(fields.get(&of).cloned().unwrap_or_default()),
         Attribute::Chart => {
-            let charts = charts(&mesh.positions, &mesh.uvs, Triangles::of(mesh).of_skin());
+            let charts = charts(&mesh.positions, mesh.atlas_uvs(), Triangles::of(mesh).of_skin());
             floats(charts.into_iter().map(|chart| chart as f32).collect())
         }
         Attribute::Corner => floats(corner_marks(count).into_flattened()),
@@ -74,6 +75,7 @@ pub(super) fn by_corner(
         normals: each(&mesh.normals, triangles),
         tangents: each(&mesh.tangents, triangles),
         uvs: each(&mesh.uvs, triangles),
+        own_atlas_uvs: each(&mesh.own_atlas_uvs, triangles),
         triangles: (0..triangles.len()).map(corners).collect(),
         morphs: mesh.morphs.iter().map(morph).collect(),
         joints: each(&mesh.joints, triangles),

@@ -3,7 +3,7 @@
 
 use std::collections::HashMap;
 
-use glam::{DMat4, DVec4};
+use glam::{DMat4, DVec4, Vec2};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use skinfit::export::{self, Target};
 use skinfit::gpu::RenderOptions;
@@ -14,7 +14,7 @@ use skinfit::prepare::Baked;
 use skinfit::render::antialias::Antialias;
 use skinfit::scene::Scene;
 use skinfit::scene::charts::charts;
-use skinfit::scene::maps::Maps;
+use skinfit::scene::maps::{Map, Maps};
 use skinfit::shader::atlas::{Pass, PassKind, pass_function};
 use skinfit::shader::{Budget, Facts, Plan, plan};
 
@@ -59,14 +59,22 @@ fn head_with(more: &[Effect], change: impl FnOnce(&mut Scene)) -> Baked {
 type Named = (&'static str, fn(&mut Scene));
 
 /// Named choices that change the passes.
-fn choices() -> [Named; 5] {
+fn choices() -> [Named; 6] {
     [
         ("five taps", |_| ()),
         ("taps a texel apart", |scene| scene.choices.diffusion.taps = Taps::Full),
         ("stretch by neighbours", |scene| scene.choices.diffusion.stretch = Stretch::Derivative),
         ("filled for one fetch", |scene| scene.choices.diffusion.lookup = Lookup::Dilated),
         ("added up in texels", |scene| scene.choices.diffusion.combined = Combined::Map),
+        ("coordinates of its own", mirrored),
     ]
+}
+
+/// The atlas stays, by texture coordinates of its own; those of maps come to lie on one another.
+fn mirrored(scene: &mut Scene) {
+    let mesh = &mut scene.mesh;
+    mesh.own_atlas_uvs = std::mem::take(&mut mesh.uvs);
+    mesh.uvs = mesh.own_atlas_uvs.iter().map(|uv| Vec2::new((2.0 * uv.x - 1.0).abs(), uv.y)).collect();
 }
 
 /// What `skinfit export` calls for.
@@ -145,8 +153,12 @@ fn exported_passes_are_taken_by_the_compilers_of_their_languages() {
             scene.params.set(param(name), 0.5);
         }
     });
+    let two_sets = head(|scene| {
+        mirrored(scene);
+        scene.maps.color = Some(Map { width: 1, height: 1, texels: vec![[0.5; 3]] });
+    });
     let heads = choices().map(|(name, change)| (name, head(change)));
-    for (name, baked) in heads.into_iter().chain([("everything", whole)]) {
+    for (name, baked) in heads.into_iter().chain([("everything", whole), ("maps by another set", two_sets)]) {
         let plan = plan(&engine_facts(&baked)).unwrap();
         assert!(plan.passes.len() >= 7, "{name}");
         let glsl = exported(Target::Glsl, &baked);
@@ -176,8 +188,12 @@ fn exported_passes_are_taken_by_the_compilers_of_their_languages() {
             .validate(&module)
             .unwrap_or_else(|error| panic!("{name}: {}\n{wgsl}", error.emit_to_string(&wgsl)));
         assert!(!glsl.contains("as the rule of that name gives it"), "{name}: {glsl}");
+        let own = !baked.scene.mesh.own_atlas_uvs.is_empty();
+        let uv = if own { "vertex_atlas_uv" } else { "texture coordinates" };
+        assert_eq!(glsl.contains("- vertex_atlas_uv: texture coordinates by which"), own, "{name}: {glsl}");
         // The head says what to do, in order, and what of.
         for words in [
+            &*format!("each vertex at its {uv}: in clip space"),
             "Before the image come passes over the UV atlas, into textures of 96 x 96 texels",
             "1. draw the mesh: skinfit_diffusion_",
             "skinfit_diffusion_level_0_pass into skinfit_diffusion_level_0_level",
@@ -195,13 +211,14 @@ fn vertex_fields(baked: &Baked) -> HashMap<&'static str, Vec<Vec<f32>>> {
     let eye = views[0].camera.eye().as_vec3();
     let numbers = |count: usize, of: &dyn Fn(usize) -> Vec<f32>| (0..count).map(of).collect::<Vec<_>>();
     let count = mesh.positions.len();
-    let of_charts = charts(&mesh.positions, &mesh.uvs, &mesh.triangles);
+    let of_charts = charts(&mesh.positions, mesh.atlas_uvs(), &mesh.triangles);
     let open = baked.occlusion.as_ref().map(|occlusion| occlusion.base.clone());
     let silhouette = |i: usize| 1.0 - mesh.normals[i].dot((mesh.positions[i] - eye).normalize()).abs();
     HashMap::from([
         ("vertex_position", numbers(count, &|i| mesh.positions[i].to_array().to_vec())),
         ("vertex_normal", numbers(count, &|i| mesh.normals[i].to_array().to_vec())),
         ("vertex_uv", numbers(count, &|i| mesh.uvs[i].to_array().to_vec())),
+        ("vertex_atlas_uv", numbers(count, &|i| mesh.atlas_uvs()[i].to_array().to_vec())),
         ("vertex_chart", numbers(count, &|i| vec![of_charts[i] as f32])),
         ("vertex_occlusion", numbers(count, &|i| vec![open.as_ref().map_or(1.0, |open| open[i])])),
         ("vertex_view", numbers(count, &|i| (mesh.positions[i] - eye).normalize().to_array().to_vec())),
@@ -222,7 +239,8 @@ fn clips(scene: &Scene) -> [Vec<[f32; 4]>; 2] {
         DVec4::new(0.0, 0.0, near * far / (near - far), 0.0),
     ];
     let seen = DMat4::from_cols(columns[0], columns[1], columns[2], columns[3]) * camera.world_to_camera;
-    let unwrapped = scene.mesh.uvs.iter().map(|uv| [2.0 * uv.x - 1.0, 1.0 - 2.0 * uv.y, 0.5, 1.0]).collect();
+    let in_atlas = |uv: &Vec2| [2.0 * uv.x - 1.0, 1.0 - 2.0 * uv.y, 0.5, 1.0];
+    let unwrapped = scene.mesh.atlas_uvs().iter().map(in_atlas).collect();
     let place = |p: &glam::Vec3| (seen * DVec4::from((p.as_dvec3(), 1.0))).as_vec4().to_array();
     [unwrapped, scene.mesh.positions.iter().map(place).collect()]
 }

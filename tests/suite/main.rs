@@ -48,6 +48,7 @@ mod lobe;
 mod materials;
 mod meshes;
 mod occlusion;
+mod own_atlas;
 mod phases;
 mod plain;
 mod props;

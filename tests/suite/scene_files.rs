@@ -565,15 +565,23 @@ fn the_atlas_is_of_the_texture_coordinates_that_the_scene_names() {
     assert_eq!(uvs("uv_set = 1"), [1.0, 1.0]);
     assert_eq!(uvs("uv_set = 0"), [0.0, 1.0]);
     assert_eq!(uvs(""), [0.0, 1.0]);
+    // Beside maps the mesh has both sets, where they are two.
     let maps = "[maps]\ncolor = \"color.png\"\n";
-    assert!(scene(maps, "uv_set = 0").is_ok());
-    let told = scene(maps, "uv_set = 1").unwrap_err().to_string();
-    assert!(told.contains("uv_set = 1") && told.contains("texture coordinates 0"), "{told}");
+    for one in ["", "uv_set = 0"] {
+        assert!(scene(maps, one).unwrap().0.mesh.own_atlas_uvs.is_empty());
+    }
+    let mesh = scene(maps, "uv_set = 1").unwrap().0.mesh;
+    assert_eq!((mesh.uvs[1].to_array(), mesh.atlas_uvs()[1].to_array()), ([0.0, 1.0], [1.0, 1.0]));
+    assert_eq!(mesh.pose().atlas_uvs(), mesh.own_atlas_uvs);
     assert!(scene("", "uv_set = 16").unwrap_err().to_string().contains("uv_set"));
     // What the mesh does not have.
-    let told = scene("", "uv_set = 2").unwrap_err().to_string();
-    assert!(told.contains("has no texture coordinates 2 (TEXCOORD_2)") && told.contains("uv_set"), "{told}");
+    for maps in ["", maps] {
+        let told = scene(maps, "uv_set = 2").unwrap_err().to_string();
+        let place = told.contains("quad.glb: mesh ") && told.contains(", primitive 0: ");
+        let what = told.contains("has no texture coordinates 2 (TEXCOORD_2)");
+        assert!(place && what && told.contains("name another set (`uv_set` in [diffusion])"), "{told}");
+    }
     // Where nothing is computed in the atlas, a number that is none is refused all the same.
     let bare = |set: &str| folder.edited("[fit]", &format!("[diffusion]\nuv_set = {set}\n[fit]"));
-    assert!(bare("1").is_ok() && bare("99").is_err());
+    assert!(bare("1").unwrap().0.mesh.own_atlas_uvs.is_empty() && bare("99").is_err());
 }

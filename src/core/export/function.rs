@@ -215,6 +215,9 @@ pub(super) fn meaning(plan: &Plan, field: &str) -> String {
         "vertex_tangent" => "tangent, as interpolated",
         "vertex_bitangent" => "bitangent w cross(N, T), as interpolated",
         "vertex_uv" => "texture coordinates, origin at the image's top left",
+        "vertex_atlas_uv" => {
+            "texture coordinates by which the mesh lies in the UV atlas: the set that `uv_set` in the scene's [diffusion] names"
+        }
         "vertex_occlusion" => "open share of the hemisphere, 1 = unoccluded",
         "vertex_chart" => {
             "number of the vertex' connected piece of the UV atlas, counted from 1 (charts.csv of `skinfit bake --stages`)"

@@ -5,6 +5,7 @@ use super::function::meaning;
 use super::names;
 use crate::shader::Plan;
 use crate::shader::atlas::{Level, Pass, PassKind, pass_function};
+use crate::shader::domain::{ATLAS_UV, UV};
 
 /// The lines that say so; none where nothing is computed in texels.
 pub(super) fn wiring(plan: &Plan) -> Vec<String> {
@@ -19,7 +20,8 @@ pub(super) fn wiring(plan: &Plan) -> Vec<String> {
         format!("pass' value is read back at: u = (column + 0.5) / {size}, v = (row + 0.5) / {size}. In this order:"),
     ];
     lines.extend(plan.passes.iter().enumerate().map(|(i, pass)| format!("{}. {}", i + 1, step(pass))));
-    lines.push("A draw is of the whole mesh, nothing culled, no depth, each vertex at its texture coordinates: in clip space x = 2 u - 1,".to_owned());
+    let uv = if plan.facts.atlas_uv() == UV { "texture coordinates" } else { ATLAS_UV };
+    lines.push(format!("A draw is of the whole mesh, nothing culled, no depth, each vertex at its {uv}: in clip space x = 2 u - 1,"));
     lines.push("and y = 2 v - 1 where y = -1 is row 0 of a texture (OpenGL, Vulkan), y = 1 - 2 v where y = 1 is (Direct3D, Metal,".to_owned());
     lines.push("WebGPU). It takes of the vertices, in world space:".to_owned());
     lines.extend(plan.texel_surface().iter().map(|(name, _)| format!("- {name}: {}", meaning(plan, name))));

@@ -54,7 +54,7 @@ impl Atlas {
     /// When the mesh has no texture coordinates, or does not lie in the unit square; or the effects cannot be computed.
     pub fn new(setup: &Setup, posed: &PosedSurface<'_>, maps: &Maps, size: u32) -> Result<Self, AtlasError> {
         let triangles_of_skin = posed.mesh.skin_triangles();
-        let layout = Layout::new(&posed.mesh.uvs, &triangles_of_skin, size)?;
+        let layout = Layout::new(posed.mesh.atlas_uvs(), &triangles_of_skin, size)?;
         let any = FaceSizes { irradiance: Some(1), specular: Some(1), hilite: Some(1), reflected: Some(1) };
         // Turned or not, the same is read.
         let inputs = texel_inputs(&Facts::of_samples(*setup, any, true))?;

@@ -91,8 +91,9 @@ impl<'a> PosedSurface<'a> {
         let made = || MipMaps::new(&scene.maps, scene.quality.texture_filter).map(Arc::new);
         let mip_maps = bakes.mip_maps.cloned().or_else(made);
         let needs = scene.needs();
-        let Mesh { positions, uvs, .. } = &scene.mesh;
-        let charts = if needs.atlas { charts(positions, uvs, &mesh.skin_triangles()) } else { Vec::new() };
+        let Mesh { positions, .. } = &scene.mesh;
+        let of_skin = || charts(positions, scene.mesh.atlas_uvs(), &mesh.skin_triangles());
+        let charts = if needs.atlas { of_skin() } else { Vec::new() };
         let fields = needs.fields;
         Ok(Self { open, mip_maps, charts, ..Self::with_fields(scene, mesh, rays, morphs, bakes, fields)? })
     }

@@ -163,7 +163,8 @@ impl Border {
 
 /// The charts' borders, and for each which of them is the same edge of the surface.
 fn borders(mesh: &PosedMesh, charts: &[u32], size: f64) -> (Vec<Border>, Vec<Option<usize>>) {
-    let PosedMesh { positions, uvs, triangles, .. } = mesh;
+    let PosedMesh { positions, triangles, .. } = mesh;
+    let uvs = mesh.atlas_uvs();
     // Vertices that a file splits where normals jump are one: what counts is where they are. -0 and 0 are one place.
     let bits = |x: f32| (x + 0.0).to_bits();
     let place = |i: u32| positions[i as usize].to_array().map(bits);

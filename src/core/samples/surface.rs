@@ -149,6 +149,7 @@ impl<'a> Surface<'a> {
         };
         let dapple_normal = interpolated.to_array();
         let chart = self.posed.charts.get(corners[0]).map_or(1.0, |&chart| chart as f32);
+        let uv = if self.mesh.own_atlas_uvs.is_empty() { uv } else { hit.atlas_uv(self.mesh) };
         (
             fragment,
             Unmade { dapple_normal, corner_silhouettes, corner_shares: weights, uv: uv.to_array(), chart },

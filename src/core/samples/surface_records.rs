@@ -46,7 +46,7 @@ pub struct Unmade {
     pub corner_silhouettes: [f32; 3],
     /// What each corner counts: barycentric coordinates.
     pub corner_shares: [f32; 3],
-    /// Texture coordinates, by which levels of the UV atlas are looked up.
+    /// Texture coordinates of the UV atlas, by which its levels are looked up.
     pub uv: [f32; 2],
     /// The chart of the atlas that they lie in.
     pub chart: f32,
@@ -68,7 +68,7 @@ pub struct Asked {
     pub corners: bool,
     pub specular: bool,
     pub attenuator: bool,
-    /// Texture coordinates, and their chart of the atlas.
+    /// Texture coordinates of the UV atlas, and their chart.
     pub uv: bool,
     /// Numbers of vertices that files of rules declare.
     pub fields: Fields,

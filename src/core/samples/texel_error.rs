@@ -14,7 +14,8 @@ pub enum AtlasError {
     /// A tiled mesh: several places would share a texel.
     #[error(
         "texture coordinates lie in the tile ({u}, {v}){}, but effects that are computed in the UV atlas need all of \
-         them in the unit square: UDIMs are not read. Lay the mesh out there, or leave those effects out.",
+         them in the unit square: UDIMs are not read. Lay the mesh out there, name another set of them (`uv_set` in \
+         [diffusion]), or leave those effects out.",
         udim(*u, *v)
     )]
     Outside {
@@ -26,7 +27,8 @@ pub enum AtlasError {
     /// Texels that are of two places of the surface.
     #[error(
         "{:.1}% of the texels that the mesh covers of its UV atlas are of two or more places of the surface (mirrored or \
-         overlapping charts), and a texel cannot hold two lights. Unwrap the mesh so that its charts lie apart, or leave the effects out that are computed there.",
+         overlapping charts), and a texel cannot hold two lights. Name a set of texture coordinates whose charts lie apart \
+         (`uv_set` in [diffusion]), unwrap the mesh so, or leave the effects out that are computed there.",
         100.0 * share
     )]
     Overlap {

@@ -1,6 +1,6 @@
 //! What texels hold: numbers of the mesh's vertices, of maps and of what is found at its points.
 
-use glam::{DVec2, Vec2, Vec3, Vec4};
+use glam::{DVec2, Vec3, Vec4};
 
 use super::footprint::{Footprint, filtered};
 use super::texel_cover::{Layout, Triangle};
@@ -26,19 +26,35 @@ pub(super) struct Textured<'a> {
 }
 
 impl Textured<'_> {
-    /// A map at texture coordinates, over a texel of the atlas; `neutral` where there is none.
+    /// A map where a triangle's vertices count so much, over a texel of the atlas; `neutral` where there is none.
     fn map<const C: usize>(
         &self,
         pick: impl Fn(&Maps) -> Option<&Map<C>>,
         neutral: [f32; C],
-        uv: Vec2,
+        (triangle, weights): (&Triangle, [f64; 3]),
     ) -> [f32; C] {
         let Some(map) = pick(self.maps) else { return neutral };
-        let step = 1.0 / f64::from(self.layout.size);
+        let uv = self.of_maps(triangle, weights).as_vec2();
         match self.mip_maps {
-            Some(mip_maps) => filtered(map, mip_maps, pick, uv, &Footprint::new([step, 0.0], [0.0, step])),
+            Some(mip_maps) => filtered(map, mip_maps, pick, uv, &self.footprint(triangle)),
             None => map.sample(uv.x, uv.y),
         }
+    }
+
+    /// The texture coordinates of the maps, weighed so.
+    fn of_maps(&self, triangle: &Triangle, weights: [f64; 3]) -> DVec2 {
+        let corner = |i: usize| self.posed.uvs.get(triangle.vertices[i]).copied().unwrap_or_default();
+        (0..3).map(|i| weights[i] * corner(i).as_dvec2()).sum()
+    }
+
+    /// What a texel of the atlas covers of maps.
+    fn footprint(&self, triangle: &Triangle) -> Footprint {
+        if self.posed.own_atlas_uvs.is_empty() {
+            let step = 1.0 / f64::from(self.layout.size);
+            return Footprint::new([step, 0.0], [0.0, step]);
+        }
+        let [along, down] = triangle.steps().map(|step| self.of_maps(triangle, step).to_array());
+        Footprint::new(along, down)
     }
 }
 
@@ -97,21 +113,17 @@ impl Field {
     }
 
     pub(super) fn value(&self, mesh: &Textured<'_>, triangle: &Triangle, weights: [f64; 3]) -> f32 {
-        let uv = || {
-            let corner = |i: usize| weights[i] * mesh.posed.uvs[triangle.vertices[i]].as_dvec2();
-            (0..3).map(corner).sum::<DVec2>().as_vec2()
-        };
-        let c = self.component;
+        let (c, at) = (self.component, (triangle, weights));
         match self.of {
-            Quantity::Color => mesh.map(|maps| maps.color.as_ref(), [1.0; 3], uv())[c],
-            Quantity::Specular => mesh.map(|maps| maps.specular.as_ref(), [1.0], uv())[0],
-            Quantity::Attenuator => mesh.map(|maps| maps.attenuator.as_ref(), [1.0], uv())[0],
-            Quantity::NormalMap => mesh.map(|maps| maps.normal.as_ref(), [0.5, 0.5, 1.0], uv())[c],
+            Quantity::Color => mesh.map(|maps| maps.color.as_ref(), [1.0; 3], at)[c],
+            Quantity::Specular => mesh.map(|maps| maps.specular.as_ref(), [1.0], at)[0],
+            Quantity::Attenuator => mesh.map(|maps| maps.attenuator.as_ref(), [1.0], at)[0],
+            Quantity::NormalMap => mesh.map(|maps| maps.normal.as_ref(), [0.5, 0.5, 1.0], at)[c],
             Quantity::Mapped(field) => {
                 let neutral = field.info().neutral;
                 match field.info().numbers {
-                    1 => mesh.map(|maps| maps.scalar(field), [neutral], uv())[0],
-                    _ => mesh.map(|maps| maps.colored(field), [neutral; 3], uv())[c],
+                    1 => mesh.map(|maps| maps.scalar(field), [neutral], at)[0],
+                    _ => mesh.map(|maps| maps.colored(field), [neutral; 3], at)[c],
                 }
             }
             Quantity::Found(field) => {
@@ -139,7 +151,7 @@ impl Field {
                 let (n, t) = (normals.get(i).copied().unwrap_or_default(), tangent());
                 (t.w * n.cross(t.truncate()).normalize_or_zero())[self.component]
             }
-            Quantity::Uv => uvs[i][self.component],
+            Quantity::Uv => uvs.get(i).map_or(0.0, |uv| uv[self.component]),
             Quantity::Declared(field) => {
                 let held = mesh.posed.fields.iter().find(|held| held.field == field);
                 held.map_or(field.info().neutral, |held| held.of(i)[self.component])
@@ -151,6 +163,8 @@ impl Field {
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec2;
+
     use super::super::texel_cover::{EMPTY, Listed, listed, overlap};
     use super::*;
     use crate::model::texture_filter::TextureFilter;
@@ -225,6 +239,30 @@ mod tests {
         for filter in [TextureFilter::Trilinear, TextureFilter::Anisotropic] {
             assert_eq!(value(MipMaps::new(&maps, filter).as_ref()), 0.5);
         }
+    }
+
+    #[test]
+    fn maps_that_lie_elsewhere_than_the_atlas_are_read_there_over_what_a_texel_covers_of_them() {
+        // Mirrored along u at half the pace, along v at a quarter of it.
+        let of_maps = [[0.5, 0.0], [0.0, 0.0], [0.5, 0.25]].map(Vec2::from).to_vec();
+        let of_atlas = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+        let bare = mesh(&of_atlas, &[[0, 1, 2]]);
+        let own_atlas_uvs = of_atlas.map(Vec2::from).to_vec();
+        let posed = PosedMesh { uvs: of_maps, own_atlas_uvs, ..bare.posed.clone() };
+        let columns = (0..64 * 64).map(|i| [(i % 64) as f32]).collect();
+        let maps = Maps { specular: Some(Map { width: 64, height: 64, texels: columns }), ..Maps::default() };
+        let layout = Layout { uvs: posed.atlas_uvs(), ..bare.layout };
+        let mesh = Textured { posed: &posed, maps: &maps, layout, ..bare };
+        let triangle = mesh.layout.triangle(0);
+        let weights = triangle.weights(DVec2::new(2.5, 1.5));
+        let value = |name: &str, component| {
+            let field = Field::of(&Input { name: name.to_owned(), component }).unwrap();
+            field.value(&mesh, &triangle, weights)
+        };
+        // At u = 0.5 - 2.5 / 16, half a texel beyond the centre of column 21; all of these are sums of few halves.
+        assert_eq!([value("vertex_uv", 0), value("vertex_uv", 1)], [0.34375, 0.046875]);
+        assert_eq!(value("specular", 0), 21.5);
+        assert_eq!(mesh.footprint(&triangle), Footprint::new([-0.0625, 0.0], [0.0, 0.03125]));
     }
 
     #[test]

@@ -29,11 +29,20 @@ impl Hit {
     /// The texture coordinates there; 0 where the mesh has none.
     #[must_use]
     pub fn uv(&self, mesh: &PosedMesh) -> Vec2 {
-        if mesh.uvs.is_empty() {
+        self.mean(mesh, &mesh.uvs)
+    }
+
+    /// Those by which the mesh lies in the UV atlas.
+    pub(super) fn atlas_uv(&self, mesh: &PosedMesh) -> Vec2 {
+        self.mean(mesh, mesh.atlas_uvs())
+    }
+
+    fn mean(&self, mesh: &PosedMesh, uvs: &[Vec2]) -> Vec2 {
+        if uvs.is_empty() {
             return Vec2::ZERO;
         }
         let corners = mesh.triangles[self.triangle as usize];
-        self.weights().into_iter().zip(corners).map(|(weight, i)| weight * mesh.uvs[i as usize]).sum()
+        self.weights().into_iter().zip(corners).map(|(weight, i)| weight * uvs[i as usize]).sum()
     }
 }
 

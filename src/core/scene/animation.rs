@@ -4,6 +4,7 @@ use std::path::Path;
 
 use toml::Spanned;
 
+use super::diffusion;
 use super::error::{SceneError, Warnings, warn};
 use super::file::{SceneFile, Source};
 use super::gltf::{Ask, Document, SkinMaps, Tangents, TextureUv, Uvs};
@@ -39,7 +40,8 @@ impl Animation {
         let needs = scene.needs();
         let own = own_maps(&file, &document, (&pose, needs), &mut Warnings::new())?;
         let uv = own.map(|own| own.uv()).unwrap_or_default();
-        let ask = Ask { uv, ..ask(&scene.maps, scene.form, scene.effects, needs, &pose) };
+        let (uv, atlas_uv) = diffusion::uvs(&source, &file.diffusion, (&scene.maps, uv), needs.atlas)?;
+        let ask = Ask { uv, atlas_uv, ..ask(&scene.maps, scene.form, scene.effects, needs, &pose) };
         let seconds = document.animation_seconds()?;
         Ok(seconds.map(|seconds| Self { document, ask, layout: scene.maps.layout, seconds }))
     }
@@ -173,17 +175,14 @@ pub(super) fn own_maps(
 
 /// What the effects want of the mesh, `maps` being those that they look up.
 pub(super) fn ask(maps: &Maps, form: Form, effects: Effects, needs: Needs, pose: &Pose) -> Ask {
-    let Maps { color, normal, specular, attenuator, own, .. } = maps;
-    let built_in = color.is_some() || normal.is_some() || specular.is_some() || attenuator.is_some();
-    let looked_up = built_in || !own.is_empty();
-    let uvs = match (needs.maps() || needs.atlas, looked_up || needs.atlas) {
+    let uvs = match (needs.maps() || needs.atlas, !maps.are_none() || needs.atlas) {
         // What is not skin has maps of its own.
         (false, _) if pose.skin.is_some() => Uvs::Optional,
         (false, _) => Uvs::None,
         (true, false) => Uvs::Optional,
         (true, true) => Uvs::Required,
     };
-    let tangents = match (needs.tangents, normal.is_some()) {
+    let tangents = match (needs.tangents, maps.normal.is_some()) {
         (false, _) => Tangents::None,
         (true, true) => Tangents::Exact,
         // Decoded, a missing normal map is N itself; read as printed it leans along T and B.
@@ -193,6 +192,7 @@ pub(super) fn ask(maps: &Maps, form: Form, effects: Effects, needs: Needs, pose:
     Ask {
         uvs,
         uv: TextureUv::default(),
+        atlas_uv: None,
         colors: false,
         tangents,
         morphs: effects.has(Effect::Morph),

@@ -89,30 +89,21 @@ const HUMAN_HEAD: [(f64, [f64; 3]); 6] = [
     (7.41, [0.078, 0.0, 0.0]),
 ];
 
-/// The texture coordinates by which the mesh lies in the atlas: those of the maps, or the set that the table names where
-/// no map is looked up. `asked` says that something is computed there.
-pub(super) fn atlas_uv(
+/// The texture coordinates of the mesh, and those by which it lies in the atlas where these are others: the set that the
+/// table names beside the maps'. Where no map is looked up one set is enough. `asked` says that something is computed in the
+/// atlas.
+pub(super) fn uvs(
     source: &Source,
     table: &DiffusionTable,
     (maps, of_maps): (&Maps, TextureUv),
     asked: bool,
-) -> Result<TextureUv, SceneError> {
-    let Some(given) = &table.uv_set else { return Ok(of_maps) };
-    let set = uv_set(source, Some(given))?;
-    let Maps { color, normal, specular, attenuator, own, .. } = maps;
-    let looked_up = color.is_some() || normal.is_some() || specular.is_some() || attenuator.is_some();
-    if looked_up || !own.is_empty() {
-        if set == of_maps.set || !asked {
-            return Ok(of_maps);
-        }
-        let what = format!(
-            "uv_set = {set}, but the maps are looked up by texture coordinates {}, and a mesh has one set of them here",
-            of_maps.set
-        );
-        let remedy = "Lay the maps out by the set that does not overlap, or leave the maps out";
-        return Err(source.error(given, what, remedy));
+) -> Result<(TextureUv, Option<TextureUv>), SceneError> {
+    let Some(given) = &table.uv_set else { return Ok((of_maps, None)) };
+    let of_atlas = TextureUv::of_set(uv_set(source, Some(given))?);
+    if maps.are_none() {
+        return Ok((of_atlas, None));
     }
-    Ok(TextureUv::of_set(set))
+    Ok((of_maps, Some(of_atlas).filter(|of_atlas| asked && of_atlas.set != of_maps.set)))
 }
 
 fn uv_set(source: &Source, given: Option<&Spanned<i64>>) -> Result<u32, SceneError> {

@@ -41,6 +41,7 @@ impl Facts {
             f16,
             tessellation: tessellation_error(scene),
             atlas: atlas.then_some(scene.diffusion.light_map_size),
+            own_atlas_uvs: atlas && !mesh.own_atlas_uvs.is_empty(),
             stored_texels: false,
             shadows: shadows(scene),
             work: if atlas { work(scene) } else { Work::default() },
@@ -71,7 +72,8 @@ fn shadows(scene: &Scene) -> Option<ShadowFacts> {
 /// How many vertices, texels of the atlas and fragments an image of the first view takes. Where the charts overlap,
 /// texels are counted again.
 fn work(scene: &Scene) -> Work {
-    let Mesh { positions, uvs, triangles, .. } = &scene.mesh;
+    let Mesh { positions, triangles, .. } = &scene.mesh;
+    let uvs = scene.mesh.atlas_uvs();
     let corner = |i: u32| uvs.get(i as usize).copied().unwrap_or_default();
     let area = |[a, b, c]: [u32; 3]| {
         let [a, b, c] = [a, b, c].map(corner);

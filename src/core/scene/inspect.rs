@@ -155,6 +155,7 @@ impl MeshContents {
         let ask = Ask {
             uvs: Uvs::None,
             uv: TextureUv::default(),
+            atlas_uv: None,
             colors: false,
             tangents: Tangents::None,
             morphs: true,

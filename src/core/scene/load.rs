@@ -130,12 +130,12 @@ impl Scene {
         let of_file = (&source, &file);
         let material = SkinMaterial::read(of_file, &document, (&pose, needs), &mut maps, &mut warnings)?;
         let uv = material.as_ref().map(SkinMaterial::uv).unwrap_or_default();
-        let uv = diffusion::atlas_uv(&source, &file.diffusion, (&maps, uv), needs.atlas)?;
+        let (uv, atlas_uv) = diffusion::uvs(&source, &file.diffusion, (&maps, uv), needs.atlas)?;
         if choices.normal_filter == NormalFilter::Toksvig {
             maps.normalise_normals();
         }
         bar.inc(1);
-        let ask = Ask { clip: options.clip, uv, ..ask(&maps, form, effects, needs, &pose) };
+        let ask = Ask { clip: options.clip, uv, atlas_uv, ..ask(&maps, form, effects, needs, &pose) };
         let mut mesh = document.mesh(&ask, &mut warnings)?;
         if let Some(material) = material {
             material.finish(&document, (&mut maps, &mut mesh), &mut warnings);

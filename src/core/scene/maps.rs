@@ -79,6 +79,14 @@ pub enum OwnMap {
 }
 
 impl Maps {
+    /// Whether nothing is looked up.
+    #[must_use]
+    pub fn are_none(&self) -> bool {
+        let Self { color, normal, specular, attenuator, own, .. } = self;
+        let built_in = color.is_some() || normal.is_some() || specular.is_some() || attenuator.is_some();
+        !built_in && own.is_empty()
+    }
+
     /// The map of a field of one number.
     #[must_use]
     pub fn scalar(&self, field: Field) -> Option<&Map<1>> {

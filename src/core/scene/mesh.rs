@@ -21,6 +21,8 @@ pub struct Mesh {
     pub tangents: Vec<Vec4>,
     /// glTF texture coordinates: origin at the image's top left.
     pub uvs: Vec<Vec2>,
+    /// Those by which it lies in the UV atlas, where they are another set than the maps'.
+    pub own_atlas_uvs: Vec<Vec2>,
     /// Vertex indices, counter-clockwise from outside.
     pub triangles: Vec<[u32; 3]>,
     /// Morph targets.
@@ -43,6 +45,17 @@ impl Mesh {
     pub fn rest(&self) -> RestSurface {
         RestSurface { positions: self.positions.clone(), normals: self.normals.clone() }
     }
+
+    /// The texture coordinates by which it lies in the UV atlas.
+    #[must_use]
+    pub fn atlas_uvs(&self) -> &[Vec2] {
+        own_or(&self.own_atlas_uvs, &self.uvs)
+    }
+}
+
+/// Texture coordinates of the atlas: the maps' where it has none of its own.
+fn own_or<'a>(own: &'a [Vec2], of_maps: &'a [Vec2]) -> &'a [Vec2] {
+    if own.is_empty() { of_maps } else { own }
 }
 
 /// One morph target: what is added at weight 1.
@@ -71,6 +84,8 @@ pub struct PosedMesh {
     pub tangents: Vec<Vec4>,
     /// Texture coordinates; empty when not asked for.
     pub uvs: Vec<Vec2>,
+    /// Those by which it lies in the UV atlas, where they are another set than the maps'.
+    pub own_atlas_uvs: Vec<Vec2>,
     /// Vertex indices.
     pub triangles: Vec<[u32; 3]>,
     /// Numbers that rules read by name.
@@ -91,6 +106,12 @@ pub struct RestSurface {
 }
 
 impl PosedMesh {
+    /// The texture coordinates by which it lies in the UV atlas.
+    #[must_use]
+    pub fn atlas_uvs(&self) -> &[Vec2] {
+        own_or(&self.own_atlas_uvs, &self.uvs)
+    }
+
     /// The same without what has holes or blends, whose triangles have no area then.
     #[must_use]
     pub fn without_open(mut self) -> Self {

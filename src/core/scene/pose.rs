@@ -39,9 +39,9 @@ impl Mesh {
         let count = self.positions.len();
         let surfaces =
             (0..count).into_par_iter().with_min_len(BLOCK).map(|i| self.vertex(i, &active, &bones));
-        let (uvs, triangles, fields) = (self.uvs.clone(), self.triangles.clone(), self.fields.clone());
-        let plain = self.plain.clone();
-        let mut posed = PosedMesh { uvs, triangles, fields, plain, ..PosedMesh::default() };
+        let (uvs, own_atlas_uvs) = (self.uvs.clone(), self.own_atlas_uvs.clone());
+        let (triangles, fields, plain) = (self.triangles.clone(), self.fields.clone(), self.plain.clone());
+        let mut posed = PosedMesh { uvs, own_atlas_uvs, triangles, fields, plain, ..PosedMesh::default() };
         let single = |v: [f64; 3]| DVec3::from(v).as_vec3();
         let (places, frames): (Vec<Vec3>, Vec<(Vec3, Vec3)>) =
             surfaces.map(|s| (single(s.position), (single(s.normal), single(s.tangent)))).unzip();

@@ -69,6 +69,7 @@ impl Mesh {
         again(&mut self.positions, i);
         again(&mut self.normals, i);
         again(&mut self.uvs, i);
+        again(&mut self.own_atlas_uvs, i);
         for field in &mut self.fields {
             let again = field.of(i).to_vec();
             field.numbers.extend(again);

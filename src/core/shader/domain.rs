@@ -99,15 +99,18 @@ pub enum EdgeError {
     Declared,
 }
 
-/// Texture coordinates, by which texels are found.
+/// Texture coordinates, by which maps are looked up, and texels where the atlas has none of its own.
 pub const UV: &str = "vertex_uv";
+
+/// Texture coordinates of the atlas' own, by which texels are found.
+pub const ATLAS_UV: &str = "vertex_atlas_uv";
 
 /// The chart of the atlas that a point lies in, counted from 1: a fragment looks up texels of its own chart.
 pub const CHART: &str = "vertex_chart";
 
 /// Every edge from one domain to another. Passes from texels to texels are rules of their own (`pass`): each costs
 /// [`TAP_COST`] a tap and direction beside its kernel.
-pub const EDGES: [Edge; 3] = [
+pub const EDGES: [Edge; 4] = [
     Edge {
         name: "interpolated",
         from: Domain::Vertex,
@@ -118,7 +121,7 @@ pub const EDGES: [Edge; 3] = [
         when: &[],
         beside: &[],
     },
-    // The mesh is drawn with its texture coordinates as positions.
+    // The mesh is drawn with its texture coordinates in the atlas as positions.
     Edge {
         name: "rasterised",
         from: Domain::Vertex,
@@ -129,18 +132,21 @@ pub const EDGES: [Edge; 3] = [
         when: &["atlas"],
         beside: &[],
     },
-    // Four texels are read and weighed in the shader, as rules that filter maps there do.
-    Edge {
-        name: "sampled",
-        from: Domain::Texel,
-        to: Domain::Fragment,
-        cost: 34.0,
-        cost_a_number: 0.0,
-        error: EdgeError::Declared,
-        when: &["atlas"],
-        beside: &[UV, CHART],
-    },
+    SAMPLED,
+    Edge { when: &["atlas", "own_atlas_uvs"], beside: &[ATLAS_UV, CHART], ..SAMPLED },
 ];
+
+/// Four texels are read and weighed in the shader, as rules that filter maps there do.
+const SAMPLED: Edge = Edge {
+    name: "sampled",
+    from: Domain::Texel,
+    to: Domain::Fragment,
+    cost: 34.0,
+    cost_a_number: 0.0,
+    error: EdgeError::Declared,
+    when: &["atlas", "!own_atlas_uvs"],
+    beside: &[UV, CHART],
+};
 
 /// Operations that a pass takes for a tap beside its kernel: two texels are read and weighed.
 pub const TAP_COST: f64 = 16.0;

@@ -1,7 +1,7 @@
 //! A plan: the chosen rules, the passes that go before, and what they read.
 
 use super::atlas::{self, Level, Pass};
-use super::domain::{CHART, Domain, UV};
+use super::domain::{CHART, Domain};
 use super::facts::{Facts, Source};
 use super::kept::kept_fields;
 use super::quantity::{Attribute, Constant, Resource};
@@ -117,7 +117,7 @@ pub fn plan(facts: &Facts) -> Result<Plan, PlanError> {
             let mut given: Vec<&'static str> = sample_fields(facts).iter().map(|(name, _)| *name).collect();
             // By these are levels looked up, and what was found is handed to the shader.
             if facts.holds("atlas") == Some(true) {
-                given.extend([UV, CHART]);
+                given.extend([facts.atlas_uv(), CHART]);
             }
             let plan = Plan::search(facts, &[], &goals, &given)?;
             let wgsl = plan.sample_module(&parts);
@@ -209,7 +209,7 @@ impl Plan {
         }
         let of_fragments = |rule: &&&'static Rule| rule.domain == Domain::Fragment;
         let fragments: Vec<&'static Rule> = found.rules.iter().filter(of_fragments).copied().collect();
-        let goals = [vertex_goals, &[UV, CHART]].concat();
+        let goals = [vertex_goals, &[facts.atlas_uv(), CHART]].concat();
         let rules = atlas::with_vertices(&found, Domain::Fragment, &goals, fragments);
         let levels = atlas::looked_up(facts, &found.carried);
         let mut plan = Self::of_rules(facts, &rules, &found.carried, levels);
@@ -235,9 +235,9 @@ impl Plan {
         let mut varyings: Vec<(&'static str, &'static str)> = Vec::new();
         let mut interpolated = 0.0;
         let needs = shading().flat_map(|rule| rule.needs.iter().map(|need| (rule.domain, *need)));
-        // Fragments look levels up by their texture coordinates.
+        // Fragments look levels up by their texture coordinates in the atlas.
         let looks_up = !levels.is_empty() && shading().all(|rule| rule.domain == Domain::Fragment);
-        let by = [(Domain::Fragment, (UV, "vec2f")), (Domain::Fragment, (CHART, "f32"))];
+        let by = [(Domain::Fragment, (facts.atlas_uv(), "vec2f")), (Domain::Fragment, (CHART, "f32"))];
         let by = by.into_iter().filter(|_| looks_up);
         let stored = texel_fields(facts);
         for (domain, (quantity, kind)) in needs.chain(by) {

@@ -11,7 +11,7 @@ use crate::model::shadow_filter::ShadowFilter;
 use crate::model::terms::TermName;
 use crate::model::texture_filter::TextureFilter;
 use crate::model::transmission;
-use crate::shader::domain::Work;
+use crate::shader::domain::{ATLAS_UV, UV, Work};
 use crate::shader::quantity::Resource;
 use crate::shader::term::library;
 
@@ -141,6 +141,9 @@ pub struct Facts {
     /// Texels along a side of the UV atlas; without one nothing is computed in texels. Of stored samples it only counts
     /// whether there is one.
     pub atlas: Option<u32>,
+    /// Whether the mesh lies in it by other texture coordinates than the maps'. Stored samples hold no others, and do not
+    /// count it.
+    pub own_atlas_uvs: bool,
     /// Whether texels are stored beside samples: what was found there stays while a fit moves what it was found with.
     pub stored_texels: bool,
     /// Shadow maps, where lights have them.
@@ -178,6 +181,7 @@ impl Default for Facts {
             f16: false,
             tessellation: 0.0,
             atlas: None,
+            own_atlas_uvs: false,
             stored_texels: false,
             shadows: None,
             work: Work::default(),
@@ -215,7 +219,7 @@ impl Facts {
     }
 
     /// Conditions of a rule's `when` line that are neither effects nor forms.
-    pub const CONDITIONS: [&'static str; 35] = [
+    pub const CONDITIONS: [&'static str; 36] = [
         "layered",
         "lights_bounce",
         "traced_lobe",
@@ -246,6 +250,7 @@ impl Facts {
         "square_rim",
         "f16",
         "atlas",
+        "own_atlas_uvs",
         "shadow_maps",
         "shadow_hardware",
         "shadow_pcf",
@@ -306,10 +311,17 @@ impl Facts {
                 let field = own.strip_prefix("has_").and_then(|own| own.strip_suffix("_map"));
                 return field.and_then(Field::from_name).map(|field| self.maps.own.has(field));
             }
+            "own_atlas_uvs" => self.own_atlas_uvs && self.source == Source::Raster,
             "atlas" => self.source != Source::Terms && self.atlas.is_some_and(|size| size > 0),
             // Last, as many may have been added.
             effect => return Effect::from_name(effect).map(|effect| setup.effects.has(effect)),
         })
+    }
+
+    /// The texture coordinates, by their name in rules, by which the mesh lies in the UV atlas.
+    #[must_use]
+    pub fn atlas_uv(&self) -> &'static str {
+        if self.holds("own_atlas_uvs") == Some(true) { ATLAS_UV } else { UV }
     }
 
     /// How shadow maps are compared, where there are any.

@@ -17,6 +17,8 @@ pub enum Attribute {
     Tangent,
     /// Texture coordinates: `vec2f`.
     Uv,
+    /// Texture coordinates of the UV atlas' own: `vec2f`.
+    AtlasUv,
     /// Open share of the hemisphere at rest: `f32`.
     Occlusion,
     /// Indices of four bones: `vec4u`.
@@ -34,11 +36,12 @@ pub enum Attribute {
 
 impl Attribute {
     /// The built-in attributes.
-    pub const BUILT_IN: [Self; 9] = [
+    pub const BUILT_IN: [Self; 10] = [
         Self::Position,
         Self::Normal,
         Self::Tangent,
         Self::Uv,
+        Self::AtlasUv,
         Self::Occlusion,
         Self::Joints,
         Self::Weights,
@@ -60,6 +63,7 @@ impl Attribute {
             Self::Normal => "rest_normal",
             Self::Tangent => "rest_tangent",
             Self::Uv => "rest_uv",
+            Self::AtlasUv => "rest_atlas_uv",
             Self::Occlusion => "rest_occlusion",
             Self::Joints => "joints",
             Self::Weights => "joint_weights",
@@ -75,7 +79,7 @@ impl Attribute {
         match self {
             Self::Position | Self::Normal | Self::Corner => "vec3f",
             Self::Tangent | Self::Weights => "vec4f",
-            Self::Uv => "vec2f",
+            Self::Uv | Self::AtlasUv => "vec2f",
             Self::Occlusion | Self::Chart => "f32",
             Self::Joints => "vec4u",
             Self::Field(field) => field.wgsl(),
@@ -88,7 +92,7 @@ impl Attribute {
         match self {
             Self::Position | Self::Normal | Self::Corner => 12,
             Self::Tangent | Self::Weights | Self::Joints => 16,
-            Self::Uv => 8,
+            Self::Uv | Self::AtlasUv => 8,
             Self::Occlusion | Self::Chart => 4,
             Self::Field(field) => 4 * field.info().numbers as u64,
         }

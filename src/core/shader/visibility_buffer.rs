@@ -134,9 +134,13 @@ impl Plan {
     /// Whether fragments take steps of their texture coordinates.
     fn takes_steps(&self) -> bool {
         let body = self.fragment_function("fn shaded", ["", ""]);
-        let fragments = self.functions(&[Domain::Fragment]) + &body;
-        without_neighbours(&fragments) != fragments
+        takes_map_steps(&(self.functions(&[Domain::Fragment]) + &body))
     }
+}
+
+/// Whether a text takes steps of the texture coordinates that maps are looked up by.
+pub(super) fn takes_map_steps(wgsl: &str) -> bool {
+    without_neighbours(wgsl) != wgsl
 }
 
 /// A text of fragments that take the steps of texture coordinates from their triangle, not from their neighbours.

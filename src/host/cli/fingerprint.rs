@@ -126,6 +126,11 @@ fn mesh(mesh: &Mesh, metres_per_unit: f64) -> String {
         .numbers(mesh.joints.as_flattened())
         .numbers(mesh.weights.as_flattened())
         .numbers(&bones);
+    // What a scene asks for that has two sets of texture coordinates stands behind what all have.
+    let rest = match &*mesh.own_atlas_uvs {
+        [] => rest,
+        own => rest.numbers(&own.iter().flat_map(glam::Vec2::to_array).collect::<Vec<f32>>()),
+    };
     let rest = mesh.fields.iter().fold(rest, |all, of| all.words(&of.field).numbers(&of.numbers));
     // Which triangles are no skin, and which of those have holes: pixels that show them do not count.
     let rest = mesh.plain.iter().fold(rest, |all, plain| {

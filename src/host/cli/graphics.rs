@@ -67,7 +67,9 @@ impl Task {
                 format!("This is a fault of skinfit or of the driver: please report it{without}")
             }
             GpuError::OutsideAtlas { .. } => {
-                "Unwrap the mesh into the unit square, or leave the effect out".to_owned()
+                "Unwrap the mesh into the unit square, name another set of texture coordinates (`uv_set` in [diffusion]), or leave \
+                 the effect out"
+                    .to_owned()
             }
             GpuError::NothingShown => {
                 let without = self.without().map_or(String::new(), |without| format!(", or {without}"));

@@ -185,7 +185,7 @@ fn not_read(contents: &MeshContents) -> String {
     }
     if contents.parts.iter().any(|part| part.uv_sets > 1) {
         lines.push(
-            "texture coordinates but the set that a part's first picture names, or `uv_set` in [diffusion]"
+            "texture coordinates but the sets that a part's first picture and `uv_set` in [diffusion] name"
                 .to_owned(),
         );
     }

@@ -80,8 +80,7 @@ impl Stages {
     /// # Errors
     /// When a file cannot be written.
     pub(super) fn write(&self, folder: &Path, mesh: &Mesh) -> Result<usize, Refusal> {
-        let Mesh { positions, uvs, triangles, .. } = mesh;
-        let charts = charts::charts(positions, uvs, triangles);
+        let charts = charts::charts(&mesh.positions, mesh.atlas_uvs(), &mesh.triangles);
         let rows = charts.iter().enumerate().map(|(vertex, chart)| format!("{vertex},{chart}\n"));
         let text = std::iter::once("vertex,chart\n".to_owned()).chain(rows).collect::<String>();
         output::write(&folder.join("charts.csv"), text.as_bytes())?;

@@ -3,7 +3,6 @@
 use crate::model::diffusion::{DiffusionChoices, Method, Seams};
 use crate::model::effects::{Effect, Effects, Prerequisite};
 use crate::samples::atlas::overlap;
-use crate::scene::mesh::Mesh;
 use crate::scene::{Offers, Scene};
 use crate::shader::term::library;
 
@@ -33,10 +32,9 @@ fn is_possible(scene: &Scene, offers: Offers, effect: Effect) -> bool {
 
 /// Whether light can stand in texels of the mesh's UV atlas, and be blurred there by a renderer.
 fn has_atlas(scene: &Scene) -> bool {
-    let Mesh { uvs, triangles, .. } = &scene.mesh;
     let DiffusionChoices { method, seams, .. } = scene.choices.diffusion;
     let drawn = method == Method::Separable && seams == Seams::Cut;
-    drawn && overlap(uvs, triangles, scene.diffusion.light_map_size).is_ok()
+    drawn && overlap(scene.mesh.atlas_uvs(), &scene.mesh.triangles, scene.diffusion.light_map_size).is_ok()
 }
 
 impl Move {

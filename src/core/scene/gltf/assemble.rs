@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::{DMat3, DMat4, DVec3, Mat4, Vec3, Vec4};
+use glam::{DMat3, DMat4, DVec3, Mat4, Vec2, Vec3, Vec4};
 use gltf::json;
 
 use super::document::Document;
@@ -107,10 +107,11 @@ impl Builder<'_> {
                 }
                 None => None,
             };
-            // What is not skin is drawn by maps of its own.
+            // What is not skin is drawn by maps of its own, and does not lie in the atlas.
             let loose = plain.map(|plain| Ask {
                 uvs: if self.ask.uvs == Uvs::None { Uvs::None } else { Uvs::Optional },
                 uv: plain.uv,
+                atlas_uv: None,
                 colors: true,
                 ..self.ask.clone()
             });
@@ -229,7 +230,10 @@ impl Builder<'_> {
             n
         }));
         if self.ask.uvs != Uvs::None {
-            mesh.uvs.extend(part.uvs.unwrap_or_else(|| vec![glam::Vec2::ZERO; count]));
+            mesh.uvs.extend(part.uvs.unwrap_or_else(|| vec![Vec2::ZERO; count]));
+        }
+        if self.ask.atlas_uv.is_some() {
+            mesh.own_atlas_uvs.extend(part.atlas_uvs.unwrap_or_else(|| vec![Vec2::ZERO; count]));
         }
         for (field, numbers) in mesh.fields.iter_mut().zip(part.fields) {
             field.numbers.extend(numbers);

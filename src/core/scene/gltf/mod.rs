@@ -53,6 +53,8 @@ pub(super) struct Ask {
     pub uvs: Uvs,
     /// Which ones of the skin.
     pub uv: TextureUv,
+    /// By which it lies in the UV atlas, where these are others.
+    pub atlas_uv: Option<TextureUv>,
     /// Colours of vertices.
     pub colors: bool,
     /// Tangents, and how good they must be.

@@ -10,7 +10,7 @@ use json::mesh::{Mode, Primitive, Semantic};
 use json::validation::Checked;
 
 use super::document::Document;
-use super::{Ask, Tangents, Uvs};
+use super::{Ask, Tangents, TextureUv, Uvs};
 use crate::model::fields::{Field, FieldInfo};
 use crate::scene::error::{SceneError, Warnings, warn};
 
@@ -29,6 +29,8 @@ pub(super) struct Part {
     pub normals: Option<Vec<Vec3>>,
     pub tangents: Option<Vec<Vec4>>,
     pub uvs: Option<Vec<Vec2>>,
+    /// Of the UV atlas, where these are others.
+    pub atlas_uvs: Option<Vec<Vec2>>,
     /// Of each field that is asked for, its numbers.
     pub fields: Vec<Vec<f32>>,
     /// Bone indices (into the skin) and weights.
@@ -128,8 +130,14 @@ impl Document {
             None => None,
         };
         same(tangents.as_ref().map_or(count, Vec::len), "tangents")?;
-        let uvs = self.uvs(attribute(Semantic::TexCoords(ask.uv.set)), place, ask)?;
-        same(uvs.as_ref().map_or(count, Vec::len), "texture coordinates")?;
+        let uvs = self.uvs(primitive, place, (ask.uv, ask.uvs))?;
+        let atlas_uvs = match ask.atlas_uv {
+            Some(uv) => self.uvs(primitive, place, (uv, Uvs::Required))?,
+            None => None,
+        };
+        for uvs in [&uvs, &atlas_uvs].into_iter().flatten() {
+            same(uvs.len(), "texture coordinates")?;
+        }
         let colors = match attribute(Semantic::Colors(0)).filter(|_| ask.colors) {
             Some(index) => Some(self.colors(index, place)?),
             None => None,
@@ -156,22 +164,35 @@ impl Document {
             targets.push(target);
         }
         let triangles = self.triangles(primitive, mode, count, place)?;
-        Ok(Some(Part { positions, normals, tangents, uvs, fields, influences, colors, triangles, targets }))
+        Ok(Some(Part {
+            positions,
+            normals,
+            tangents,
+            uvs,
+            atlas_uvs,
+            fields,
+            influences,
+            colors,
+            triangles,
+            targets,
+        }))
     }
 
     fn vectors(&self, index: Index<Accessor>) -> Result<Vec<Vec3>, SceneError> {
         Ok(self.floats::<3>(index)?.into_iter().map(Vec3::from).collect())
     }
 
+    /// A set of texture coordinates, as it is wanted.
     fn uvs(
         &self,
-        index: Option<Index<Accessor>>,
+        primitive: &Primitive,
         place: &str,
-        ask: &Ask,
+        (uv, wanted): (TextureUv, Uvs),
     ) -> Result<Option<Vec<Vec2>>, SceneError> {
-        let Some(index) = index.filter(|_| ask.uvs != Uvs::None) else {
-            if ask.uvs == Uvs::Required {
-                let set = ask.uv.set;
+        let set = uv.set;
+        let index = primitive.attributes.get(&Checked::Valid(Semantic::TexCoords(set))).copied();
+        let Some(index) = index.filter(|_| wanted != Uvs::None) else {
+            if wanted == Uvs::Required {
                 return Err(self
                     .error(
                         format!("has no texture coordinates {set} (TEXCOORD_{set}), but maps or texels are to be looked up by them"),
@@ -182,7 +203,7 @@ impl Document {
             }
             return Ok(None);
         };
-        let uvs = ask.uv.moved(self.floats::<2>(index)?.into_iter().map(Vec2::from).collect());
+        let uvs = uv.moved(self.floats::<2>(index)?.into_iter().map(Vec2::from).collect());
         match uvs.iter().position(|uv| !uv.is_finite()) {
             None => Ok(Some(uvs)),
             Some(i) => Err(self

@@ -34,7 +34,7 @@ pub use self::level::{Axis, Level};
 pub(super) use self::order::with_vertices;
 use self::order::{depths, in_levels, upstream};
 pub use self::text::{sample_buffered_level, stored};
-use super::domain::{CHART, DIRECTIONS, Domain, TAP_COST, UV};
+use super::domain::{CHART, DIRECTIONS, Domain, TAP_COST};
 use super::emit::Plan;
 use super::facts::{Facts, Source};
 use super::rule::{Kernel, Rule};
@@ -115,8 +115,9 @@ pub(super) fn passes(facts: &Facts, found: &Found) -> Result<Vec<Pass>, PlanErro
     if let Some(rule) = blurs.filter(|_| drawn && facts.setup.choices.diffusion.seams == Seams::Joined) {
         return Err(PlanError::Joined { level: rule.gives[0].0 });
     }
-    if drawn && !found.rules.iter().any(|rule| rule.domain == Domain::Vertex && rule.gives_quantity(UV)) {
-        return Err(PlanError::NoPlan { goals: UV.to_owned() });
+    let uv = facts.atlas_uv();
+    if drawn && !found.rules.iter().any(|rule| rule.domain == Domain::Vertex && rule.gives_quantity(uv)) {
+        return Err(PlanError::NoPlan { goals: uv.to_owned() });
     }
     let depths = depths(&texels);
     let depth = |rule: &Rule| rule.gives.iter().filter_map(|(q, _)| depths.get(q)).max().copied();
@@ -192,13 +193,14 @@ fn draw(
         rule.gives.iter().map(|(quantity, swizzle)| Level::new(*quantity, rule.given_type(swizzle)))
     });
     let levels = given.filter(|level| needed(&level.name)).collect();
-    let rules = with_vertices(found, Domain::Texel, &[UV, CHART], shading);
+    let uv = facts.atlas_uv();
+    let rules = with_vertices(found, Domain::Texel, &[uv, CHART], shading);
     let mut plan = Plan::of_rules(facts, &rules, &found.carried, levels);
     if facts.source == Source::Raster {
         plan.varyings.push((CHART, "f32"));
-        let held = plan.varyings.iter().any(|(name, _)| *name == UV);
-        if !held && text::takes_steps(&plan.functions(&[Domain::Texel])) {
-            plan.varyings.push((UV, "vec2f"));
+        let held = plan.varyings.iter().any(|(name, _)| *name == uv);
+        if !held && text::takes_steps(&plan) {
+            plan.varyings.push((uv, "vec2f"));
         }
     }
     plan.wgsl = text::draw(&plan, leaves);

@@ -10,8 +10,10 @@ use crate::model::diffusion::{DiffusionChoices, Lookup, Method, Seams};
 use crate::model::effects::{Effect, Effects, Form, Silhouette};
 use crate::model::evaluate::Setup;
 use crate::model::params::Param;
+use crate::model::texture_filter::TextureFilter;
 use crate::shader::domain::Work;
 use crate::shader::facts::{Budget, MapFacts, Source};
+use crate::shader::quantity::Attribute;
 use crate::shader::tangent::chain::Seed;
 use crate::shader::term::{Problem, Term, library, register};
 use crate::shader::{Resource, plan};
@@ -162,6 +164,30 @@ fn every_pass_is_valid_in_every_kind_of_scene() {
             assert!(!pass.plan.wgsl.contains("eye") && !pass.plan.wgsl.contains("view_projection"));
         }
     }
+}
+
+#[test]
+fn levels_are_looked_up_by_the_atlas_own_coordinates_and_maps_by_theirs() {
+    let one = facts(Effects::of(&[Effect::Diffuse, Effect::Occlusion]));
+    let by = |uv: &str| format!("level_corners(mist_near_level, at.{uv}, round(at.vertex_chart))");
+    for filter in [TextureFilter::Bilinear, TextureFilter::Trilinear, TextureFilter::Anisotropic] {
+        for budget in [Budget::Exact, Budget::Paper] {
+            let maps = MapFacts { filter, ..one.maps };
+            let planned = plan(&Facts { maps, budget, own_atlas_uvs: true, ..one }).unwrap();
+            validate(&planned);
+            planned.passes.iter().for_each(|pass| validate(&pass.plan));
+            assert!(planned.wgsl.contains(&by("vertex_atlas_uv")));
+            let first = &planned.passes[0].plan;
+            assert!(
+                first.attributes.contains(&Attribute::Uv) && first.attributes.contains(&Attribute::AtlasUv)
+            );
+            // A texel covers of maps what the triangle says.
+            assert_eq!(first.wgsl.contains("vertex_uv_along_u"), filter.reads_levels());
+        }
+    }
+    let planned = plan(&one).unwrap();
+    assert!(planned.wgsl.contains(&by("vertex_uv")));
+    assert!(planned.passes.iter().all(|pass| !pass.plan.wgsl.contains("atlas_uv")));
 }
 
 #[test]

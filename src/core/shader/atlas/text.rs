@@ -13,7 +13,7 @@ use crate::shader::facts::{Facts, Source};
 use crate::shader::module::{sample_struct, uniform};
 use crate::shader::rule::Rule;
 use crate::shader::vertex_stage::{CORNERS, Clip, means};
-use crate::shader::visibility_buffer::{BETWEEN_FRAGMENTS, with_steps};
+use crate::shader::visibility_buffer::{BETWEEN_FRAGMENTS, takes_map_steps, with_steps};
 
 /// The functions by which fragments look levels up that are textures.
 pub(crate) fn sample_level(facts: &Facts) -> String {
@@ -123,15 +123,20 @@ impl Steps {
 }
 
 fn steps(plan: &Plan, wgsl: &str) -> Vec<Steps> {
-    let taken = |name: &str| ["dpdx", "dpdy"].iter().any(|call| wgsl.contains(&format!("{call}({name})")));
-    let places = plan.places(Clip::Left).into_iter();
-    let stepped = places.filter(|(name, ..)| *name != UV && taken(name));
+    let taken = |name: &str| match name {
+        // In the atlas that they lay out, texture coordinates go on by a texel.
+        UV => plan.facts.atlas_uv() != UV && takes_map_steps(wgsl),
+        name => ["dpdx", "dpdy"].iter().any(|call| wgsl.contains(&format!("{call}({name})"))),
+    };
+    let stepped = plan.places(Clip::Left).into_iter().filter(|(name, ..)| taken(name));
     stepped.map(|(name, kind, place)| Steps { name, kind, place }).collect()
 }
 
-/// Whether rules of texels take steps to neighbours.
-pub(super) fn takes_steps(functions: &str) -> bool {
-    functions.contains("dpdx(") || functions.contains("dpdy(")
+/// Whether rules of texels take steps to neighbours, which follow from where the corners lie in the atlas.
+pub(super) fn takes_steps(plan: &Plan) -> bool {
+    let functions = plan.functions(&[Domain::Texel]);
+    let of_maps = plan.facts.atlas_uv() != UV && takes_map_steps(&functions);
+    of_maps || functions.contains("dpdx(") || functions.contains("dpdy(")
 }
 
 /// Whether a draw is left with steps that the triangle does not tell.
@@ -141,8 +146,8 @@ pub(super) fn is_between_texels(wgsl: &str) -> bool {
 
 /// How the corners' shares go on to the next texel along u, and along v.
 fn share_steps(plan: &Plan) -> String {
-    let uv =
-        plan.places(Clip::Left).into_iter().find(|(name, ..)| *name == UV).map_or(0, |(.., place)| place);
+    let mut places = plan.places(Clip::Left).into_iter();
+    let uv = places.find(|(name, ..)| *name == plan.facts.atlas_uv()).map_or(0, |(.., place)| place);
     format!(
         "\nfn corner_in_texels(first: u32) -> vec2f {{\n    \
          return {}.0 * vec2f(varyings[first + {uv}u], varyings[first + {uv}u + 1u]);\n}}\n\n\
@@ -174,10 +179,13 @@ fn steps_set(steps: &[Steps]) -> String {
     wgsl
 }
 
-/// A text that takes steps from what [`steps_set`] has set; those of texture coordinates are a texel's.
+/// A text that takes steps from what [`steps_set`] has set; those of texture coordinates that lay the atlas out are a
+/// texel's.
 fn with_triangles_steps(wgsl: &str, plan: &Plan, steps: &[Steps]) -> String {
     let one = format!("1.0 / {}.0", size(plan));
-    let (along, down) = (format!("vec2f({one}, 0.0)"), format!("vec2f(0.0, {one})"));
+    let of_texel = || [format!("vec2f({one}, 0.0)"), format!("vec2f(0.0, {one})")];
+    let of_maps = steps.iter().find(|step| step.name == UV);
+    let [along, down] = of_maps.map_or_else(of_texel, Steps::names);
     let mut text = with_steps(wgsl, [&along, &down]);
     for step in steps {
         let [along, down] = step.names();
@@ -232,10 +240,11 @@ pub(super) fn reads(levels: &[Level], place: &str) -> String {
 /// What fragments look up: which texels count is the same of all levels.
 pub(crate) fn sampled(facts: &Facts, levels: &[Level]) -> String {
     let Some(first) = levels.first() else { return String::new() };
+    let uv = facts.atlas_uv();
     let (before, by) = if facts.dilates() {
-        (String::new(), format!("at.{UV}"))
+        (String::new(), format!("at.{uv}"))
     } else {
-        let corners = format!("level_corners({}, at.{UV}, round(at.{CHART}))", first.bound());
+        let corners = format!("level_corners({}, at.{uv}, round(at.{CHART}))", first.bound());
         (format!("    let corners = {corners};\n"), "corners".to_owned())
     };
     let read = |level: &Level| {

@@ -54,6 +54,9 @@ impl Remeshed {
                 if !mesh.uvs.is_empty() {
                     mesh.uvs.push(0.5 * (mesh.uvs[i] + mesh.uvs[j]));
                 }
+                if !mesh.own_atlas_uvs.is_empty() {
+                    mesh.own_atlas_uvs.push(0.5 * (mesh.own_atlas_uvs[i] + mesh.own_atlas_uvs[j]));
+                }
                 for of in &mut mesh.fields {
                     let between: Vec<f32> =
                         of.of(i).iter().zip(of.of(j)).map(|(x, y)| 0.5 * (x + y)).collect();
@@ -92,9 +95,19 @@ impl Remeshed {
     /// The scene with this mesh and these settings, sampled.
     pub(super) fn evaluated(&self, bench: &Bench<'_>, settings: Settings) -> Result<Evaluated, StudyError> {
         let mut scene = bench.scene(settings);
-        let PosedMesh { positions, normals, tangents, uvs, triangles, fields, plain, rest: _ } =
+        let PosedMesh { positions, normals, tangents, uvs, own_atlas_uvs, triangles, fields, plain, rest: _ } =
             self.mesh.clone();
-        scene.mesh = Mesh { positions, normals, tangents, uvs, triangles, fields, plain, ..Mesh::default() };
+        scene.mesh = Mesh {
+            positions,
+            normals,
+            tangents,
+            uvs,
+            own_atlas_uvs,
+            triangles,
+            fields,
+            plain,
+            ..Mesh::default()
+        };
         let occlusion = self.open.clone().map(|base| VertexOcclusion { base, morphs: Vec::new() });
         let bakes = SurfaceBakes { occlusion: occlusion.as_ref(), ..SurfaceBakes::default() };
         let samples = samples::sample_views(&scene, &self.mesh, bakes).map_err(PrepareError::from)?;

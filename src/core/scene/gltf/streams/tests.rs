@@ -55,6 +55,7 @@ fn ask(fields: Fields) -> Ask {
     Ask {
         uvs: Uvs::None,
         uv: TextureUv::default(),
+        atlas_uv: None,
         colors: false,
         tangents: Tangents::None,
         morphs: true,

@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 use super::kernel::{Loop, TAP, arguments, of_kernel, taps};
 use super::text::{reads, texel};
 use super::{Axis, Level, Pass, PassKind};
-use crate::shader::domain::{CHART, Domain, UV};
+use crate::shader::domain::{CHART, Domain};
 use crate::shader::emit::Plan;
 use crate::shader::module::literal_name;
 use crate::shader::quantity::Constant;
@@ -94,9 +94,10 @@ impl Plan {
     /// The lines that look levels up where a fragment is.
     pub(in crate::shader) fn looked_up_lines(&self) -> String {
         let chart = if self.facts.dilates() { String::new() } else { format!(", round(at.{CHART})") };
+        let uv = self.facts.atlas_uv();
         let line = |level: &Level| {
             let (bound, swizzle, name) = (level.bound(), level.swizzle(), level.quantity());
-            format!("    let {name}: {} = {bound}_at(at.{UV}{chart}).{swizzle};\n", level.kind)
+            format!("    let {name}: {} = {bound}_at(at.{uv}{chart}).{swizzle};\n", level.kind)
         };
         self.levels.iter().map(line).collect()
     }
