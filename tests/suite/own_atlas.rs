@@ -156,10 +156,13 @@ fn checks() -> Map<3> {
     Map { width: 512, height: 512, texels: (0..512 * 512).map(texel).collect() }
 }
 
+/// A scene's change, by what it shows.
+type Named = (&'static str, fn(&mut Scene));
+
 #[test]
 fn the_renderer_finds_maps_and_light_as_the_processor_does() {
     let Some(gpu) = gpu() else { return };
-    let changes: [(&str, fn(&mut Scene)); 3] = [
+    let changes: [Named; 3] = [
         ("by charts", |_| ()),
         ("by one fetch", |scene| {
             scene.choices.diffusion.lookup = Lookup::Dilated;

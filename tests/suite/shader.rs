@@ -234,6 +234,7 @@ fn shaders_of_every_combination_of_facts_validate() {
         f16: bit(bits, 8),
         tessellation: 0.003,
         atlas: None,
+        own_atlas_uvs: false,
         stored_texels: false,
         shadows: None,
         work: Work::default(),
