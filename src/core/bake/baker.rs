@@ -104,10 +104,7 @@ impl Baker<'_> {
         let key = Key::new("transfer").with(&[rays, order.bands() as u32, u32::from(albedo.is_some())]);
         let (mut key, vertices) = posed_key(key, pose, morphs);
         if let Some(albedo) = albedo {
-            key = key.with(&pose(&[]).uvs);
-            if let Some(map) = albedo.map {
-                key = key.with(&[map.width as u64, map.height as u64]).with(map.texels.as_flattened());
-            }
+            key = albedo.key(key, &pose(&[]));
         }
         // A vertex' numbers: T, and T' for three channels.
         let (direct, bounced) = (order.functions(), if albedo.is_some() { 3 * order.functions() } else { 0 });

@@ -6,16 +6,18 @@
 use glam::Vec3A;
 use rayon::prelude::*;
 
+use super::cache::Key;
 use super::vertex_rays::{Found, Rays, VertexRays};
 use super::wide_bvh::{NOTHING, WideBvh};
 use crate::progress;
 use crate::scene::maps::Map;
 use crate::scene::mesh::PosedMesh;
+use crate::scene::plain::{PlainMap, PlainParts};
 
 /// What share of light the surface throws back.
 #[derive(Clone, Copy, Debug)]
 pub struct Albedo<'a> {
-    /// The colour map, linear; without one everything is white.
+    /// The skin's colour map, linear; without one all skin is white. What is not skin has its own material.
     pub map: Option<&'a Map<3>>,
 }
 
@@ -172,19 +174,50 @@ impl Albedo<'_> {
         let weights = weights(origin, d, corners.map(|i| pose.positions[i as usize].into()))?;
         let normals = corners.map(|i| Vec3A::from(pose.normals[i as usize]));
         let faces_away = (0..3).map(|k| weights[k] * normals[k]).sum::<Vec3A>().dot(d) >= 0.0;
-        (!faces_away).then(|| Met { corners, weights, albedo: self.at(pose, corners, weights) })
+        (!faces_away).then(|| Met { corners, weights, albedo: self.at(pose, triangle, weights) })
     }
 
     /// At a place of a triangle, by its corners' weights.
-    fn at(&self, pose: &PosedMesh, corners: [u32; 3], weights: [f32; 3]) -> [f32; 3] {
+    fn at(&self, pose: &PosedMesh, triangle: u32, weights: [f32; 3]) -> [f32; 3] {
+        let corners = pose.triangles[triangle as usize];
+        let corner = |k: usize| pose.uvs.get(corners[k] as usize).copied().unwrap_or_default();
+        let uv = || (0..3).map(|k| weights[k] * corner(k)).sum::<glam::Vec2>();
+        if let Some((plain, material)) = pose.plain.as_ref().and_then(|p| Some((p, p.material(triangle)?))) {
+            let surface = material.at(uv(), plain.tint(triangle, weights));
+            return surface.thrown_back().map(|share| share as f32);
+        }
         match self.map {
             Some(map) if !map.texels.is_empty() && !pose.uvs.is_empty() => {
-                let uv = (0..3).map(|k| weights[k] * pose.uvs[corners[k] as usize]).sum::<glam::Vec2>();
+                let uv = uv();
                 map.sample(uv.x, uv.y)
             }
             _ => [1.0; 3],
         }
     }
+
+    /// A key with all that decides it.
+    pub(super) fn key(&self, mut key: Key, pose: &PosedMesh) -> Key {
+        key = key.with(&pose.uvs);
+        if let Some(map) = self.map {
+            key = key.with(&[map.width as u64, map.height as u64]).with(map.texels.as_flattened());
+        }
+        pose.plain.iter().fold(key, |key, plain| plain_key(key, plain))
+    }
+}
+
+/// A key with what decides the shares of light that parts throw back which are not skin.
+fn plain_key(key: Key, plain: &PlainParts) -> Key {
+    let materials: Vec<u16> = plain.of_triangle.iter().map(|of| of.unwrap_or(u16::MAX)).collect();
+    let colors = plain.corner_colors.as_flattened().as_flattened();
+    plain.materials.iter().fold(key.with(&materials).with(colors), |key, material| {
+        let key = key.with(&material.base_color).with(&[material.metallic]);
+        [&material.color_map, &material.roughness_map].into_iter().fold(key, |key, picture| {
+            let Some(PlainMap { map, wrap, nearest }) = picture else { return key.with(&[0_u64]) };
+            let [u, v] = wrap.map(|wrap| wrap as u64);
+            key.with(&[1, map.width as u64, map.height as u64, u, v, u64::from(*nearest)])
+                .with(map.texels.as_flattened())
+        })
+    })
 }
 
 /// How much each corner counts where a ray meets a triangle; none where rounding leaves no area.
@@ -194,4 +227,59 @@ fn weights(origin: Vec3A, d: Vec3A, corners: [Vec3A; 3]) -> Option<[f32; 3]> {
     let whole = parts[0] + parts[1] + parts[2];
     let weights = parts.map(|part| (part / whole).clamp(0.0, 1.0));
     weights.iter().all(|weight| weight.is_finite()).then_some(weights)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use glam::Vec3;
+
+    use super::*;
+    use crate::scene::plain::{Alpha, PlainMaterial};
+
+    /// White skin under a ceiling of a material that is not skin.
+    fn below_ceiling(base_color: [f32; 4], metallic: f32) -> PosedMesh {
+        let ceiling = PlainMaterial {
+            name: "ceiling".to_owned(),
+            base_color,
+            color_map: None,
+            metallic,
+            roughness: 1.0,
+            roughness_map: None,
+            alpha: Alpha::Opaque,
+            emission: [0.0; 3],
+            emission_map: None,
+        };
+        let at = |y: f32| [Vec3::new(-1.0, y, -1.0), Vec3::new(1.0, y, -1.0), Vec3::new(0.0, y, 1.0)];
+        let plain = PlainParts {
+            of_triangle: vec![None, Some(0)],
+            materials: vec![ceiling],
+            corner_colors: Vec::new(),
+        };
+        PosedMesh {
+            positions: [at(0.0), at(0.5)].concat(),
+            normals: [[Vec3::Y; 3], [Vec3::NEG_Y; 3]].concat(),
+            triangles: vec![[0, 1, 2], [3, 4, 5]],
+            plain: Some(Arc::new(plain)),
+            ..PosedMesh::default()
+        }
+    }
+
+    #[test]
+    fn what_is_not_skin_throws_its_own_colour_back() {
+        let bounced = |base_color, metallic| {
+            let mesh = below_ceiling(base_color, metallic);
+            VertexGather::new(&mesh, 64, &Albedo { map: None }).bounced(|_| [1.0; 3])[0]
+        };
+        // Rays, and what the skin throws back to the ceiling, are the same for all channels: their shares are the material's.
+        let shares = |[r, g, b]: [f32; 3]| [r / b, g / b];
+        let near =
+            |found: [f32; 2], wanted: [f32; 2]| (0..2).all(|i| (found[i] / wanted[i] - 1.0).abs() < 1e-5);
+        // 4% of what is no metal is reflected, and of the rest its colour comes back (glTF 2.0, appendix B.2).
+        let painted = bounced([0.5, 0.25, 0.0, 1.0], 0.0);
+        assert!(near(shares(painted), [0.52 / 0.04, 0.28 / 0.04]), "{painted:?}");
+        let metal = bounced([0.8, 0.4, 0.2, 1.0], 1.0);
+        assert!(near(shares(metal), [4.0, 2.0]), "{metal:?}");
+    }
 }

@@ -99,6 +99,13 @@ impl PlainSurface {
         self.f0.map(|f0| f0 + (1.0 - f0) * grazing)
     }
 
+    /// The share of light that it throws back as seen from in front: what is reflected, and what enters and leaves again.
+    #[must_use]
+    pub fn thrown_back(&self) -> [f64; 3] {
+        let diffuse = self.diffuse_towards(1.0);
+        std::array::from_fn(|c| (self.f0[c] + diffuse[c]).min(1.0))
+    }
+
     /// The diffuse albedo of what enters by that reflectance (glTF 2.0, appendix B.2: of what is no metal).
     #[must_use]
     pub fn diffuse_towards(&self, v_h: f64) -> [f64; 3] {
