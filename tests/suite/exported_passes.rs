@@ -24,6 +24,7 @@ use crate::exports::{
 use crate::graphics::bench::{Difference, EXACT, gpu, keep, on_gpu, quantile};
 use crate::graphics::raw::{Drawn, Raw, Sampled};
 use crate::lit::param;
+use crate::own_atlas::mirrored;
 use crate::sky::{effect, head_changed};
 use crate::unreal::unreal_in_hlsl;
 
@@ -68,13 +69,6 @@ fn choices() -> [Named; 6] {
         ("added up in texels", |scene| scene.choices.diffusion.combined = Combined::Map),
         ("coordinates of its own", mirrored),
     ]
-}
-
-/// The atlas stays, by texture coordinates of its own; those of maps come to lie on one another.
-fn mirrored(scene: &mut Scene) {
-    let mesh = &mut scene.mesh;
-    mesh.own_atlas_uvs = std::mem::take(&mut mesh.uvs);
-    mesh.uvs = mesh.own_atlas_uvs.iter().map(|uv| Vec2::new((2.0 * uv.x - 1.0).abs(), uv.y)).collect();
 }
 
 /// What `skinfit export` calls for.

@@ -53,7 +53,7 @@ fn head(pixels: u32, change: impl FnOnce(&mut Scene)) -> Baked {
 }
 
 /// The atlas stays as it is, by a second set of texture coordinates; the first one's halves come to lie on one another.
-fn mirrored(scene: &mut Scene) {
+pub(crate) fn mirrored(scene: &mut Scene) {
     let mesh = &mut scene.mesh;
     mesh.own_atlas_uvs = std::mem::take(&mut mesh.uvs);
     mesh.uvs = mesh.own_atlas_uvs.iter().map(|uv| Vec2::new((2.0 * uv.x - 1.0).abs(), uv.y)).collect();
