@@ -52,12 +52,8 @@ pub(super) fn strips_and_fans() -> Prop {
     file.backdrop();
     let copper = json!({"name": "Copper", "pbrMetallicRoughness": mirror(&json!([0.9, 0.6, 0.3, 1]))});
     let copper = file.material(copper);
-    let shapes: [(u32, &[[f32; 2]], Option<[[u8; 1]; 10]>); 3] = [
-        (TRIANGLE_STRIP, &STRIP, None),
-        (TRIANGLE_STRIP, &SQUARES, Some(JOINED)),
-        (TRIANGLE_FAN, &STAR, Some(CLOSED)),
-    ];
-    for (mode, places, indices) in shapes {
+    let shapes = [(TRIANGLE_STRIP, &STRIP[..]), (TRIANGLE_STRIP, &SQUARES), (TRIANGLE_FAN, &STAR)];
+    for ((mode, places), indices) in shapes.into_iter().zip([None, Some(JOINED), Some(CLOSED)]) {
         let places: Vec<[f32; 3]> = places.iter().map(|&[x, y]| [x, y, 0.0]).collect();
         let positions = file.numbers(&places);
         let mut primitive = json!({"mode": mode, "material": copper, "attributes": {"POSITION": positions}});
