@@ -13,7 +13,7 @@ use crate::lab::{Lab, Result};
 use crate::studies::number;
 
 /// The tests that measure something that a page quotes.
-const TESTS: [&str; 13] = [
+const TESTS: [&str; 14] = [
     "bakes::",
     "samples::",
     "occlusion::",
@@ -27,6 +27,7 @@ const TESTS: [&str; 13] = [
     "cameras::",
     "imported::",
     "panorama::",
+    "godot::",
 ];
 
 /// The least and the greatest of what each test measured, by name.
