@@ -353,6 +353,7 @@ fn models_that_are_damaged_or_unknown_are_refused() {
         ("1 PINHOLE 640 480 nan 1 2 3\n", "not finite"),
         ("1 PINHOLE 0 480 1 1 2 3\n", "has an image of 0 x 480 pixels"),
         ("1 PINHOLE\n", "line 1: is no camera"),
+        ("1 PINHOLE 8 8 1 1 2 3\n1 PINHOLE 8 8 1 1 2 3\n", "line 2: has the number 1, as a camera before it"),
         ("# nothing\n", "cameras.txt does not hold"),
     ] {
         std::fs::write(folder.path().join("cameras.txt"), cameras).unwrap();

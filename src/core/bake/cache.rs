@@ -84,7 +84,8 @@ impl Key {
         self
     }
 
-    fn hash(&self) -> blake3::Hash {
+    /// The hash of all that it was fed.
+    pub(super) fn hash(&self) -> blake3::Hash {
         self.0.finalize()
     }
 }

@@ -236,7 +236,7 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
-    use crate::scene::plain::{Alpha, PlainMaterial};
+    use crate::scene::plain::{Alpha, PlainMaterial, Wrap};
 
     /// White skin under a ceiling of a material that is not skin.
     fn below_ceiling(base_color: [f32; 4], metallic: f32) -> PosedMesh {
@@ -266,20 +266,48 @@ mod tests {
         }
     }
 
+    fn bounced(mesh: &PosedMesh) -> [f32; 3] {
+        VertexGather::new(mesh, 64, &Albedo { map: None }).bounced(|_| [1.0; 3])[0]
+    }
+
     #[test]
     fn what_is_not_skin_throws_its_own_colour_back() {
-        let bounced = |base_color, metallic| {
-            let mesh = below_ceiling(base_color, metallic);
-            VertexGather::new(&mesh, 64, &Albedo { map: None }).bounced(|_| [1.0; 3])[0]
+        let white = bounced(&PosedMesh { plain: None, ..below_ceiling([0.0; 4], 0.0) });
+        assert!(white[0] > 0.1, "{white:?}");
+        assert_eq!(
+            bounced(&below_ceiling([1.0; 4], 1.0)),
+            white,
+            "a white mirror throws back what white skin does"
+        );
+        // What the skin throws back to the ceiling is the same for all: what comes from there is the material's share.
+        let shares = |mesh: &PosedMesh| {
+            let found = bounced(mesh);
+            [0, 1, 2].map(|c| found[c] / white[c])
         };
-        // Rays, and what the skin throws back to the ceiling, are the same for all channels: their shares are the material's.
-        let shares = |[r, g, b]: [f32; 3]| [r / b, g / b];
-        let near =
-            |found: [f32; 2], wanted: [f32; 2]| (0..2).all(|i| (found[i] / wanted[i] - 1.0).abs() < 1e-5);
+        let near = |found: [f32; 3], wanted: [f32; 3]| (0..3).all(|c| (found[c] - wanted[c]).abs() < 1e-5);
         // 4% of what is no metal is reflected, and of the rest its colour comes back (glTF 2.0, appendix B.2).
-        let painted = bounced([0.5, 0.25, 0.0, 1.0], 0.0);
-        assert!(near(shares(painted), [0.52 / 0.04, 0.28 / 0.04]), "{painted:?}");
-        let metal = bounced([0.8, 0.4, 0.2, 1.0], 1.0);
-        assert!(near(shares(metal), [4.0, 2.0]), "{metal:?}");
+        let painted = shares(&below_ceiling([0.5, 0.25, 0.0, 1.0], 0.0));
+        assert!(near(painted, [0.52, 0.28, 0.04]), "{painted:?}");
+        let metal = shares(&below_ceiling([0.8, 0.4, 0.2, 1.0], 1.0));
+        assert!(near(metal, [0.8, 0.4, 0.2]), "{metal:?}");
+        // A picture and colours of corners are factors.
+        let mut pictured = below_ceiling([0.8, 0.4, 0.2, 1.0], 1.0);
+        let mut plain = PlainParts::clone(pictured.plain.as_ref().unwrap());
+        let map = Map { width: 1, height: 1, texels: vec![[0.5, 1.0, 1.0, 1.0]] };
+        let map = PlainMap { map: Arc::new(map), wrap: [Wrap::Repeat; 2], nearest: false };
+        plain.materials[0].color_map = Some(map);
+        plain.corner_colors = vec![[[1.0; 4]; 3], [[1.0, 0.5, 1.0, 1.0]; 3]];
+        pictured.plain = Some(Arc::new(plain));
+        assert!(near(shares(&pictured), [0.4, 0.2, 0.2]), "{:?}", shares(&pictured));
+    }
+
+    #[test]
+    fn bakes_are_of_the_materials_that_throw_light_back() {
+        let key = |mesh: &PosedMesh| Albedo { map: None }.key(Key::new("test"), mesh).hash();
+        let one = below_ceiling([0.8, 0.4, 0.2, 1.0], 1.0);
+        assert_eq!(key(&one), key(&one.clone()));
+        assert_ne!(key(&one), key(&below_ceiling([0.8, 0.4, 0.1, 1.0], 1.0)));
+        assert_ne!(key(&one), key(&below_ceiling([0.8, 0.4, 0.2, 1.0], 0.5)));
+        assert_ne!(key(&one), key(&PosedMesh { plain: None, ..one.clone() }));
     }
 }

@@ -59,9 +59,9 @@ fn a_fit_of_a_rough_loss_ends_where_it_gains_nothing_more() {
         let image = Rough { image: image.clone(), fine };
         let outcome = fitted(&image, solver, Tolerances::default().rough);
         assert_eq!(outcome.ending, Ending::Converged, "{solver:?}");
-        // Slopes that are off by OFF promise the square of it, for each unknown.
+        // Slopes that are off by up to 2 OFF promise the square of it, times what is due to unknowns that are alike.
         let above = outcome.loss_end / best.loss_end - 1.0;
-        assert!(above < 10.0 * OFF * OFF, "{solver:?}: {above:e} above the best");
+        assert!(above < 100.0 * OFF * OFF, "{solver:?}: {above:e} above the best");
         passes += outcome.evaluations;
         patient += fitted(&image, solver, 0.0).evaluations;
     }

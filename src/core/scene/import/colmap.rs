@@ -154,9 +154,23 @@ fn text_cameras(path: &Path, bytes: &[u8]) -> Result<BTreeMap<u32, Intrinsics>, 
             ));
         };
         let id = u32::try_from(id).map_err(|_| damaged(path, &place, "has a number beyond 32 bits"))?;
-        cameras.insert(id, intrinsics(path, &place, model, [width, height], &numbers)?);
+        let camera = intrinsics(path, &place, model, [width, height], &numbers)?;
+        add(&mut cameras, (id, camera), path, &place)?;
     }
     Ok(cameras)
+}
+
+/// Add a camera, whose number no other has.
+fn add(
+    cameras: &mut BTreeMap<u32, Intrinsics>,
+    (id, camera): (u32, Intrinsics),
+    path: &Path,
+    place: &str,
+) -> Result<(), SceneError> {
+    match cameras.insert(id, camera) {
+        None => Ok(()),
+        Some(_) => Err(damaged(path, place, format!("has the number {id}, as a camera before it"))),
+    }
 }
 
 fn text_images(path: &Path, bytes: &[u8]) -> Result<Vec<Posed>, SceneError> {
@@ -248,7 +262,8 @@ fn binary_cameras(path: &Path, bytes: &[u8]) -> Result<BTreeMap<u32, Intrinsics>
             return Err(damaged(path, place, format!("has the unknown camera model {model}")));
         };
         let numbers: Vec<f64> = (0..count).map(|_| bytes.f64()).collect::<Result<_, _>>()?;
-        cameras.insert(id, intrinsics(path, &place, name, size, &numbers)?);
+        let camera = intrinsics(path, &place, name, size, &numbers)?;
+        add(&mut cameras, (id, camera), path, &place)?;
     }
     bytes.end()?;
     Ok(cameras)
