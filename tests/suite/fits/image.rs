@@ -263,6 +263,32 @@ impl Objective for Image {
     }
 }
 
+/// An image of which a pass says something else: its sums are changed, by where it was made.
+pub(super) struct Altered<F> {
+    pub(super) image: Image,
+    pub(super) alter: F,
+}
+
+impl<F: Fn(&Point, &mut NormalEquations) + Sync> Objective for Altered<F> {
+    fn unknowns(&self) -> &[Unknown] {
+        self.image.unknowns()
+    }
+    fn is_quadratic(&self) -> bool {
+        self.image.is_quadratic()
+    }
+    fn normal_equations(&self, point: &Point) -> NormalEquations {
+        let mut sums = self.image.normal_equations(point);
+        (self.alter)(point, &mut sums);
+        sums
+    }
+    fn loss(&self, point: &Point) -> f64 {
+        self.normal_equations(point).loss
+    }
+    fn gradient(&self, point: &Point) -> (f64, Vec<f64>) {
+        self.normal_equations(point).loss_and_gradient()
+    }
+}
+
 impl Pixel {
     fn random(view: usize, rng: &mut StdRng) -> Self {
         let mut rgb = |low: f64, high: f64| [0, 1, 2].map(|_| rng.random_range(low..high));

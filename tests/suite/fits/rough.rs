@@ -1,48 +1,30 @@
 //! Losses whose slopes say, but for a part, what the loss does, as those of blurs do whose taps fall between texels.
 
-use skinfit::engine::{NormalEquations, Objective, Point, Unknown};
+use skinfit::engine::{NormalEquations, Objective, Point};
 use skinfit::fit::outcome::{Ending, Outcome};
 use skinfit::fit::{FitOptions, SolverKind, Tolerances, fit};
 
-use super::image::{Image, point, truth};
+use super::image::{Altered, Image, point, truth};
 
 /// How far a slope is off, as a share of the most that the residuals and its column allow (Cauchy and Schwarz): about that of
 /// a radius on the scanned head.
 const OFF: f64 = 2e-3;
 
-/// An image whose slopes along curved unknowns are off, this way and that from place to place.
-struct Rough {
-    image: Image,
-    /// How fast that changes: what is left of a large multiple looks like chance.
-    fine: f64,
-}
-
-impl Objective for Rough {
-    fn unknowns(&self) -> &[Unknown] {
-        self.image.unknowns()
-    }
-    fn is_quadratic(&self) -> bool {
-        true
-    }
-    fn normal_equations(&self, point: &Point) -> NormalEquations {
-        let mut sums = self.image.normal_equations(point);
-        let k = self.unknowns().len();
-        let curved = self.unknowns().iter().enumerate().filter(|(_, unknown)| !unknown.linear());
-        for (i, unknown) in curved {
-            let off = 2.0 * (unknown.get(point) * self.fine).sin();
+/// An image whose slopes along curved unknowns are off, this way and that from place to place; how fast that changes is `fine`:
+/// what is left of a large multiple looks like chance.
+fn rough(image: &Image, fine: f64) -> impl Objective {
+    let unknowns = image.unknowns.clone();
+    let alter = move |point: &Point, sums: &mut NormalEquations| {
+        let k = unknowns.len();
+        for (i, unknown) in unknowns.iter().enumerate().filter(|(_, unknown)| !unknown.linear()) {
+            let off = 2.0 * (unknown.get(point) * fine).sin();
             sums.jtr[i] += OFF * off * (sums.jtj[i * k + i] * sums.residual).sqrt();
         }
-        sums
-    }
-    fn loss(&self, point: &Point) -> f64 {
-        self.image.loss(point)
-    }
-    fn gradient(&self, point: &Point) -> (f64, Vec<f64>) {
-        self.normal_equations(point).loss_and_gradient()
-    }
+    };
+    Altered { image: image.clone(), alter }
 }
 
-fn fitted(image: &Rough, solver: SolverKind, rough: f64) -> Outcome {
+fn fitted(image: &dyn Objective, solver: SolverKind, rough: f64) -> Outcome {
     let tolerances = Tolerances { rough, ..Tolerances::default() };
     let options = FitOptions { solver, tolerances, ..FitOptions::default() };
     fit(image, &point(&[]), &options, &mut |_| {}).unwrap()
@@ -56,7 +38,7 @@ fn a_fit_of_a_rough_loss_ends_where_it_gains_nothing_more() {
     for (solver, fine) in
         [SolverKind::Varpro, SolverKind::Lm].iter().flat_map(|s| [1e7, 2e7, 3e7, 4e7].map(|f| (*s, f)))
     {
-        let image = Rough { image: image.clone(), fine };
+        let image = rough(&image, fine);
         let outcome = fitted(&image, solver, Tolerances::default().rough);
         assert_eq!(outcome.ending, Ending::Converged, "{solver:?}");
         // Slopes that are off by up to 2 OFF promise the square of it, times what is due to unknowns that are alike.

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::image::{Image, nine, point, tied, truth};
+use super::image::{Altered, Image, nine, point, tied, truth};
 use super::{Each, run, starts};
 use skinfit::engine::{NormalEquations, Objective, Point, Unknown};
 use skinfit::fit::outcome::Ending;
@@ -154,36 +154,15 @@ fn without_unknowns_the_outcome_is_the_start_and_its_loss() {
     }
 }
 
-/// An image whose loss or a derivative is spoilt beyond a given hilite.
-struct Spoilt {
-    image: Image,
-    beyond: f64,
-    loss: f64,
-    derivative: f64,
-}
-
-impl Objective for Spoilt {
-    fn unknowns(&self) -> &[Unknown] {
-        self.image.unknowns()
-    }
-    fn is_quadratic(&self) -> bool {
-        true
-    }
-    fn normal_equations(&self, point: &Point) -> NormalEquations {
-        let mut sums = self.image.normal_equations(point);
-        if point.params.scalar(Param::Hilite) > self.beyond {
-            sums.loss += self.loss;
-            sums.jtr[1] += self.derivative;
+/// An image whose loss and a derivative are spoilt beyond a given hilite.
+fn spoilt(image: &Image, beyond: f64, loss: f64, derivative: f64) -> impl Objective {
+    let alter = move |point: &Point, sums: &mut NormalEquations| {
+        if point.params.scalar(Param::Hilite) > beyond {
+            sums.loss += loss;
+            sums.jtr[1] += derivative;
         }
-        sums
-    }
-    fn loss(&self, point: &Point) -> f64 {
-        self.normal_equations(point).loss
-    }
-    fn gradient(&self, point: &Point) -> (f64, Vec<f64>) {
-        let sums = self.normal_equations(point);
-        (sums.loss, sums.jtr.each(|g| 2.0 * g / sums.weight))
-    }
+    };
+    Altered { image: image.clone(), alter }
 }
 
 #[test]
@@ -192,7 +171,7 @@ fn a_start_that_is_no_place_to_begin_is_refused() {
     let fail = |objective: &dyn Objective, start: &Point| {
         fit(objective, start, &FitOptions::default(), &mut |_| {}).unwrap_err()
     };
-    let spoilt = |loss, derivative| Spoilt { image: image.clone(), beyond: 0.0, loss, derivative };
+    let spoilt = |loss, derivative| spoilt(&image, 0.0, loss, derivative);
     let error = fail(&spoilt(f64::NAN, 0.0), &point(&[])).to_string();
     assert!(error.contains("the loss at the start is NaN"), "{error}");
     let error = fail(&spoilt(0.0, f64::INFINITY), &point(&[])).to_string();
@@ -265,7 +244,7 @@ fn a_solver_turns_back_from_where_the_loss_is_not_finite() {
     start.params.set(Param::Hilite, 0.1);
     start.params.set(Param::RimExponent, 1.0);
     for solver in SolverKind::ALL {
-        let spoilt = Spoilt { image: image.clone(), beyond: 0.6, loss: f64::NAN, derivative: f64::NAN };
+        let spoilt = spoilt(&image, 0.6, f64::NAN, f64::NAN);
         let outcome = run(&spoilt, &start, solver);
         assert!(outcome.loss_end < 1e-6 * outcome.loss_start, "{solver:?}: {}", outcome.loss_end);
     }
