@@ -36,28 +36,28 @@ impl ObservedView {
     /// Sum of the squared target, weighted as the residuals of a perfect fit are.
     pub(super) fn power(&self, groups: impl Iterator<Item = usize>, residuals: &Residuals) -> f64 {
         let of = |group: usize| {
-            let slots = |number: &dyn Fn(usize) -> f32| {
-                Batch::<f64, LANES>(std::array::from_fn(|lane| number(group * LANES + lane).into()))
-            };
-            let weight = slots(&|slot| self.pixel_weight(slot));
-            let square = |channel: usize| {
-                let target = slots(&|slot| self.target.number(channel, slot));
+            // A row at a time: fits of some hundred pixels are over in the time that asking slot by slot takes.
+            let slots = |row: &Row| Batch::<f64, LANES>(std::array::from_fn(|lane| row[lane].into()));
+            let weight = self.weight.get(group).map_or(Batch([1.0; LANES]), slots);
+            let square = |target: &Row| {
+                let target = slots(target);
                 let scaled = residuals.weigh(self.clip, target, target, weight).scale * target;
                 scaled.0.iter().map(|x| x * x).sum::<f64>()
             };
-            (0..self.target.stride()).map(square).sum::<f64>()
+            self.target.record(group).iter().map(square).sum::<f64>()
         };
         groups.map(of).sum()
     }
 
     /// Sum of the pixels' weights, and how many count at all.
     pub fn weight_and_count(&self, groups: impl Iterator<Item = usize>) -> (f64, u64) {
-        slots(groups)
-            .map(|slot| self.pixel_weight(slot))
-            .fold((0.0, 0), |(sum, count), weight| (sum + f64::from(weight), count + u64::from(weight > 0.0)))
+        let of = |group: usize| match self.weight.get(group) {
+            None => (LANES as f64, LANES as u64),
+            Some(row) => {
+                let sum = row.iter().map(|&weight| f64::from(weight)).sum();
+                (sum, row.iter().map(|&weight| u64::from(weight > 0.0)).sum())
+            }
+        };
+        groups.map(of).fold((0.0, 0), |(sum, count), (own, counted)| (sum + own, count + counted))
     }
-}
-
-fn slots(groups: impl Iterator<Item = usize>) -> impl Iterator<Item = usize> {
-    groups.flat_map(|group| group * LANES..(group + 1) * LANES)
 }

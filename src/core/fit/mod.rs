@@ -151,18 +151,25 @@ fn begin(
     if origin.count == 0 || origin.weight.partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater) {
         return Err(FitError::Empty);
     }
-    let derivative = |i: usize| format!("derivative of the loss by {}", coordinates.unknowns()[i].name());
-    let values = std::iter::once(("loss".to_owned(), origin.loss))
-        .chain(origin.gradient.iter().enumerate().map(|(i, &g)| (derivative(i), g)))
-        .chain(origin.hessian.iter().enumerate().map(|(ij, &h)| (derivative(ij / origin.len()), h)));
-    for (what, value) in values {
-        if !value.is_finite() {
-            return Err(FitError::NotFinite { what, value });
-        }
+    if let Some((what, value)) = first_not_finite(coordinates, &origin) {
+        return Err(FitError::NotFinite { what, value });
     }
     let mut saved = Saved::new(coordinates.unknowns(), start, options, origin);
     saved.evaluations = passes.count();
     Ok(saved)
+}
+
+/// The first number of a pass that is none, and what it is: named where it is found, as most fits find none.
+fn first_not_finite(coordinates: &Coordinates, origin: &Linearisation) -> Option<(String, f64)> {
+    let derivative = |i: usize| format!("derivative of the loss by {}", coordinates.unknowns()[i].name());
+    let k = origin.len().max(1);
+    let gradient = origin.gradient.iter().enumerate();
+    let derivatives = gradient.chain(origin.hessian.iter().enumerate().map(|(ij, h)| (ij / k, h)));
+    if !origin.loss.is_finite() {
+        return Some(("loss".to_owned(), origin.loss));
+    }
+    let (i, &value) = { derivatives }.find(|(_, value)| !value.is_finite())?;
+    Some((derivative(i), value))
 }
 
 /// The run from start `index`. A drawn start whose loss is not finite is pulled towards the given

@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use super::ahead;
 use super::code::Code;
-use super::streams::StreamOf;
+use super::streams::{BATCH, SHORT_BATCH, StreamOf};
 use crate::model::cube::Cube;
 use crate::program::tape::Tape;
 use crate::simd::Level;
@@ -46,4 +46,12 @@ pub(super) struct Bound<'a> {
     pub(super) loads: &'a [(StreamOf, usize)],
     pub(super) cubes: Vec<&'a Cube<f32>>,
     pub(super) uniforms: Vec<f32>,
+}
+
+impl Bound<'_> {
+    /// How many records it is run for at once.
+    pub(super) fn batch(&self) -> usize {
+        // The machine reads its instructions once a batch.
+        if self.cubes.is_empty() && self.program.is_compiled(self.level) { SHORT_BATCH } else { BATCH }
+    }
 }

@@ -11,13 +11,16 @@ use crate::samples::LANES;
 use crate::samples::rows::Row;
 use crate::simd::Simd;
 
-/// Records whose outputs stand side by side: a Gram matrix adds up so many at once.
+/// Records whose outputs stand side by side, at most: a Gram matrix adds up so many at once.
 pub(super) const BATCH: usize = 16;
+/// The same of a function that looks nothing up. It is over so soon that what counts is whether its outputs, some forty
+/// columns, are still in the first cache when they are added up; one that looks texels up waits less for these in longer batches.
+pub(super) const SHORT_BATCH: usize = 8;
 /// Records ahead of which fields are asked for.
 pub(super) const AHEAD: usize = 8;
 
-/// The rows of an output.
-pub(super) type Column = [Cell<Row>; BATCH];
+/// The rows of an output. One more than are used: so the first rows of all columns are spread over the sets of a cache.
+pub(super) type Column = [Cell<Row>; BATCH + 1];
 
 /// The streams that tapes read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

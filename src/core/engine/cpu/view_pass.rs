@@ -192,8 +192,9 @@ impl ViewPass<'_> {
         groups: Range<usize>,
         planes: &mut [&mut [f32]],
     ) {
-        for start in groups.clone().step_by(BATCH) {
-            let count = BATCH.min(groups.end - start);
+        let batch = self.bound.batch();
+        for start in groups.clone().step_by(batch) {
+            let count = batch.min(groups.end - start);
             let shown = self.shown(simd, scratch, start, count);
             for ((column, plane), gain) in shown.iter().zip(planes.iter_mut()).zip(self.gain) {
                 let gain = Lanes::splat(simd, gain);
@@ -325,11 +326,11 @@ impl ViewPass<'_> {
         let wanted = if wish == Wish::Normal { channels } else { &[] };
         let columns: Vec<Vec<&Column>> =
             wanted.iter().enumerate().map(|(c, channel)| self.columns(scratch, channel, c)).collect();
-        let mut loss = Lanes::splat(simd, 0.0);
+        let (mut loss, batch) = (Lanes::splat(simd, 0.0), self.bound.batch());
         for &block in blocks {
             let end = groups.min((block + 1) * BLOCK);
-            for first in (block * BLOCK..end).step_by(BATCH) {
-                let count = BATCH.min(end - first);
+            for first in (block * BLOCK..end).step_by(batch) {
+                let count = batch.min(end - first);
                 let shown = self.shown(simd, scratch, first, count);
                 let mut base = 0;
                 for (c, channel) in channels.iter().enumerate() {
@@ -348,8 +349,11 @@ impl ViewPass<'_> {
                 }
             }
         }
-        let mut folded: Vec<f64> = sums.iter().map(|row| fold(row)).collect();
-        folded.push(fold(&loss.to_array()));
+        let mut folded = vec![0.0; sums.len() + 1];
+        for (sum, row) in folded.iter_mut().zip(&sums) {
+            *sum = fold(row);
+        }
+        folded[sums.len()] = fold(&loss.to_array());
         drop(columns);
         scratch.sums = sums;
         Sums(folded)
