@@ -43,7 +43,7 @@ pub(crate) fn measure(lab: &Lab) -> Result<Value> {
         Ok((units, sum))
     };
     let ((longest_then, sum_then), (longest, sum)) = (of(ONE_PACKAGE)?, of(&head)?);
-    // A parameter of the paper's effects, then and now; and one of an effect that a file of rules declares.
+    // A parameter of the paper's effects, then and now.
     let paper = "side_specular\\|SideSpecular";
     Ok(json!({
         "rows": built.into_iter().map(row).collect::<Result<Vec<Value>>>()?,
@@ -52,7 +52,6 @@ pub(crate) fn measure(lab: &Lab) -> Result<Value> {
         "packages": { "then": packages(lab, ONE_PACKAGE)?, "now": packages(lab, &head)? },
         "files": {
             "side_specular": { "then": files_of(lab, ONE_PACKAGE, paper)?, "now": files_of(lab, &head, paper)? },
-            "fresnel_loss": files_of(lab, &head, "fresnel_loss\\|FresnelLoss")?,
         },
     }))
 }

@@ -75,12 +75,35 @@ fn measured(word: &str, next: &str) -> bool {
     is_number && (unit(behind) || (behind.is_empty() && unit(next)))
 }
 
-/// Numbers that "times as", "thirds" and the like stand behind.
-const COUNTS: [&str; 12] =
-    ["two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "twenty", "forty", "hundred"];
+/// Numbers that "times as", "thirds", "minutes" and the like stand behind.
+const COUNTS: [&str; 18] = [
+    "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve", "fifteen",
+    "sixteen", "twenty", "thirty", "forty", "fifty", "hundred",
+];
+/// Parts of a whole.
+const PARTS: [&str; 18] = [
+    "third",
+    "quarter",
+    "fifth",
+    "sixth",
+    "seventh",
+    "eighth",
+    "ninth",
+    "tenth",
+    "twelfth",
+    "sixteenth",
+    "twentieth",
+    "thirtieth",
+    "fortieth",
+    "fiftieth",
+    "sixtieth",
+    "hundredth",
+    "thousandth",
+    "millionth",
+];
 
 /// Whether words begin one of the usual measures: "three times as", "ten times faster", "twice as", "half the time", "half of",
-/// "a third", "two thirds".
+/// "a third", "two thirds", "six minutes", "half a second".
 fn measured_in_words(words: [&str; 3]) -> bool {
     let words =
         words.map(|word| word.trim_matches(|c: char| !c.is_alphanumeric() && c != '-').to_lowercase());
@@ -88,7 +111,9 @@ fn measured_in_words(words: [&str; 3]) -> bool {
         [count, "times", "as" | "faster" | "slower" | "less" | "more"] => COUNTS.contains(&count),
         [count, "thirds" | "quarters", _] => COUNTS.contains(&count),
         ["twice" | "half", "as", _] | ["half", "of", _] | ["half", "the", "time" | "cost"] => true,
-        ["a", "third" | "quarter" | "tenth", _] => true,
+        [count, "second" | "seconds" | "minutes" | "hours", _] => COUNTS.contains(&count),
+        ["half", "a" | "an", "second" | "minute" | "hour"] => true,
+        ["a", part, _] => PARTS.contains(&part),
         _ => false,
     }
 }
@@ -128,6 +153,20 @@ pub(crate) const DEFINITIONS: &[(&str, &str, &str)] = &[
     ("docs/results.md", "(0.056)", "the target's material"),
     ("docs/shaders.md", "OpenGL 4.3, OpenGL ES 3.1", "versions"),
     ("docs/accuracy.md", "to four times as much", "a bound that tests hold"),
+    ("docs/accuracy.md", "is off by a twentieth", "the mistake that is made"),
+    ("docs/gpu-engine.md", "less than a thirtieth of their standard errors", "a rule of the solvers"),
+    ("docs/gpu-engine.md", "or a twentieth of a standard error", "a bound that a test holds"),
+    ("docs/page.md", "slices of a fifth of a second", "a rule of the program"),
+    ("docs/panorama.md", "contradict by more than a twentieth", "a rule of the program"),
+    ("docs/panorama.md", "to a hundredth of it", "a bound that a test holds"),
+    ("docs/report.md", "less than a millionth", "a rule of the program"),
+    ("docs/studies.md", "less than a millionth of the loss", "a rule of the program"),
+    ("docs/studies.md", "to a sixteenth, then all", "what is varied"),
+    ("docs/studies.md", "less than a sixteenth of a step", "a rule of the program"),
+    ("docs/window.md", "In ten minutes", "a heading"),
+    ("experiments/animated/README.md", "for all but a twentieth", "what is measured"),
+    ("experiments/race/README.md", "within a thousandth of the truth", "the race's criterion"),
+    ("experiments/race/README.md", "below a millionth (noisy)", "the race's criterion"),
     ("docs/building.md", "half as many again", "a third beside two"),
     ("docs/gpu-engine.md", "half as much is tried", "a rule of the program"),
     ("docs/panorama.md", "more than a tenth is clipped", "a rule of the program"),
@@ -151,7 +190,7 @@ mod tests {
 
     #[test]
     fn a_figure_without_a_raw_file_is_found() {
-        let found = |text: &str| strays(Path::new("docs/page.md"), text).unwrap().len();
+        let found = |text: &str| strays(Path::new("docs/nowhere.md"), text).unwrap().len();
         for text in [
             "It takes 12 ms.",
             "It takes (1.5\ns).",
@@ -172,6 +211,10 @@ mod tests {
             "up to a quarter.",
             "less than half of that",
             "half as much",
+            "some eleven\nminutes",
+            "half a second",
+            "redder by a sixteenth",
+            "to a hundredth of it",
         ] {
             assert_eq!(found(text), 1, "{text}");
         }

@@ -33,21 +33,28 @@ pub(crate) fn measure(lab: &Lab) -> Result<Value> {
     let (before, patched) = (program_before(lab)?, program_patched(lab)?);
     let (mut rows, mut terms) = (Vec::new(), Vec::new());
     for (name, folder) in SCENES {
-        let scene = folder.map(|folder| plain(lab, folder)).transpose()?;
-        let fit =
-            |program: &Path, when: &str| fitted(lab, program, &format!("{name}, {when}"), scene.as_deref());
-        let [then, between, now] =
-            [fit(&before, "before")?, fit(&patched, "as today")?, fit(lab.program(), "now")?];
+        let scenes = folder.map(|folder| plain(lab, folder)).transpose()?;
+        let [scene, of_today] = [0, 1].map(|i| scenes.as_ref().map(|scenes| scenes[i].clone()));
+        let fit = |program: &Path, when: &str, scene: &Option<PathBuf>| {
+            fitted(lab, program, &format!("{name}, {when}"), scene.as_deref())
+        };
+        let then = fit(&before, "before", &scene)?;
+        let between = fit(&patched, "as today", &scene)?;
+        let now = fit(lab.program(), "now", &of_today)?;
         let off = differences(&then, &now)?;
         let picture = |off: &BTreeMap<String, Off>| off.get("").map_or(Value::Null, Off::told);
         let mut row = row(name, &then.report, &now.report);
         row["picture"] = picture(&off);
         row["patched"] = self::row(name, &between.report, &now.report);
         row["patched"]["picture"] = picture(&differences(&between, &now)?);
-        let baked =
-            |program: &Path, when: &str| bake(lab, program, &format!("{name}, {when}"), scene.as_deref());
-        let bakes = [baked(&before, "before")?, baked(lab.program(), "now")?];
-        row["occlusion"] = occlusion(&bakes).ok_or(format!("{name}: other vertices"))?;
+        let baked = |program: &Path, when: &str, scene: &Option<PathBuf>| {
+            bake(lab, program, &format!("{name}, {when}"), scene.as_deref())
+        };
+        let bakes = [baked(&before, "before", &scene)?, baked(lab.program(), "now", &of_today)?];
+        let as_today = [baked(&patched, "as today", &scene)?, bakes[1].clone()];
+        let open_sky = |bakes: &[PathBuf; 2]| occlusion(bakes).ok_or(format!("{name}: other vertices"));
+        row["occlusion"] = open_sky(&bakes)?;
+        row["patched"]["occlusion"] = open_sky(&as_today)?;
         row["cubes"] = cubes(&bakes)?;
         let built_in = || skinfit::built_in_scene(&lab.scratch.path().join("built_in"));
         row["lobes"] = beside_brute_force(&bakes, &scene.map_or_else(built_in, Ok)?)?;
@@ -105,15 +112,26 @@ fn built(lab: &Lab, folder: &str, patch: Option<&Path>, beside: &[&str]) -> Resu
     Ok(program)
 }
 
-/// A scene by the paper's model alone: without lamps and materials, which the program before did not know.
-fn plain(lab: &Lab, folder: &str) -> Result<PathBuf> {
+/// A scene by the paper's model alone, for the program before and for today's: without lamps and materials, which the first
+/// did not know.
+fn plain(lab: &Lab, folder: &str) -> Result<[PathBuf; 2]> {
     let whole = lab.scene(folder, &lab.data.join(folder).join("scene.toml"), &[])?;
     let mut document: DocumentMut = std::fs::read_to_string(&whole)?.parse()?;
     document.remove("light");
     document["mesh"].as_table_mut().ok_or("a scene has a mesh")?.remove("skin");
+    // What today's program poses by `time` alone, the first posed where the effects were named.
+    if document["mesh"].get("time").is_some() {
+        let effects = document["model"]["effects"].as_array_mut().ok_or("a scene names its effects")?;
+        effects.extend(["morph", "skin"]);
+    }
     let path = whole.with_extension("plain.toml");
     std::fs::write(&path, document.to_string())?;
-    Ok(path)
+    // Maps of the mesh file's own material, which it did not read.
+    let maps = document.entry("maps").or_insert(toml_edit::table()).as_table_mut();
+    maps.ok_or("maps are a table")?.insert("material", toml_edit::value(false));
+    let of_today = whole.with_extension("plain_today.toml");
+    std::fs::write(&of_today, document.to_string())?;
+    Ok([path, of_today])
 }
 
 fn fitted(lab: &Lab, program: &Path, what: &str, scene: Option<&Path>) -> Result<Fit> {

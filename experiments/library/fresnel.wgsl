@@ -1,7 +1,7 @@
 // Schlick's Fresnel factor on the mirrored environment (Schlick 1994).
 //
 // effect: fresnel_reflection, the mirrored environment grows towards grazing angles
-// parameter: fresnel_weight = 0.5 in [0, inf), rgb, linear; weight of the mirrored environment; Schlick 1994
+// parameter: fresnel_weight = 0.5 in [0, inf), rgb, linear, weighs fresnel_reflection; weight of the mirrored environment; Schlick 1994
 // parameter: fresnel_f0 = 0.028 in [0, 0.2]; reflectance when facing; Schlick 1994
 //
 // gives: fresnel_part

@@ -76,7 +76,7 @@ struct Gains {
     free: bool,
     /// Whether each channel of them is.
     white_balance: bool,
-    /// Whether there is anything to say of them.
+    /// Whether the pane lists them.
     shown: bool,
     /// What their sliders span.
     lower: f64,

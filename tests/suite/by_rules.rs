@@ -228,6 +228,14 @@ impl<'a, R: Number> Fragments<'a, R> {
     }
 }
 
+/// The function of a rule that those effects bring, and what it uses.
+fn texts_of_rule(effects: Effects, name: &str) -> Vec<&'static str> {
+    let rule = rules(effects).find(|rule| rule.function == name);
+    let rule = rule.unwrap_or_else(|| panic!("there is no rule {name}"));
+    let used = LIBRARY.iter().filter(|(library, _)| rule.uses.contains(library)).map(|(_, text)| *text);
+    used.chain([rule.body]).collect()
+}
+
 /// A function of the rules, alone.
 pub(crate) struct Function(Steps);
 
@@ -246,20 +254,22 @@ impl Function {
 
     /// The function of a rule that those effects bring, with what it uses.
     pub(crate) fn of_rule(effects: Effects, name: &str, arguments: &[usize]) -> Self {
-        let rule = rules(effects).find(|rule| rule.function == name);
-        let rule = rule.unwrap_or_else(|| panic!("there is no rule {name}"));
-        let used = LIBRARY.iter().filter(|(library, _)| rule.uses.contains(library)).map(|(_, text)| *text);
-        Self::new(&used.chain([rule.body]).collect::<Vec<_>>(), name, arguments)
+        Self::new(&texts_of_rule(effects, name), name, arguments)
     }
 
-    /// How the function moves along one of its arguments, a number: of its arguments, then of that one's tangent.
+    /// How it moves along one of its arguments: of its arguments, then of that one's tangent.
+    pub(crate) fn tangent_of_rule(effects: Effects, name: &str, arguments: &[usize], moved: usize) -> Self {
+        Self::tangent(&texts_of_rule(effects, name), name, arguments, moved)
+    }
+
+    /// How the function moves along one of its arguments: of its arguments, then of that one's tangent.
     pub(crate) fn tangent(texts: &[&str], name: &str, arguments: &[usize], moved: usize) -> Self {
         let text = texts.concat();
         let mut tangents = Tangents::new(&text).unwrap();
         let moving: Vec<bool> = (0..arguments.len()).map(|i| i == moved).collect();
         let tangent = tangents.of(name, &moving).unwrap().unwrap();
         assert!(!tangent.of_all, "{name} has a tangent by hand");
-        Self::new(&[&text, tangents.text()], &tangent.name, &[arguments, &[1]].concat())
+        Self::new(&[&text, tangents.text()], &tangent.name, &[arguments, &arguments[moved..=moved]].concat())
     }
 
     /// Its value.

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use skinfit::model::effects::Effect;
+use skinfit::shader::rule::LIBRARY;
 use skinfit::shader::term::register;
 
 use crate::every_effect::every_effect;
@@ -63,6 +64,15 @@ fn the_rules_that_the_page_of_shaders_shows_are_rules() {
          fn page_shown(page_soft_light: vec3f) -> vec3f {{\n    return page_soft_light;\n}}\n"
     );
     register("page_scatter", &text).unwrap_or_else(|error| panic!("{error}\n{text}"));
+}
+
+#[test]
+fn the_page_of_shaders_names_every_file_of_functions() {
+    let page = std::fs::read_to_string(root().join("docs/shaders.md")).unwrap();
+    let row = page.lines().find(|line| line.starts_with("| `uses: FILES`")).unwrap();
+    let named: Vec<&str> =
+        row.split('`').skip(1).step_by(2).skip(1).filter(|word| *word != "rules/lib").collect();
+    assert_eq!(named, LIBRARY.map(|(name, _)| name));
 }
 
 /// The project's pages, by their paths in it.

@@ -7,13 +7,16 @@ use std::f64::consts::PI;
 use glam::{DVec3, Vec3};
 use skinfit::bake::coefficients::Coefficients;
 use skinfit::bake::harmonics::{Order, basis, cosine_lobe, open_transfer};
-use skinfit::bake::shadowed::{Turning, arriving, bounce_polynomial, shadow_ratio, share_of_open};
+use skinfit::bake::shadowed::{Turning, arriving, shadow_ratio, share_of_open};
 use skinfit::bake::transfer::bake_transfer;
 use skinfit::model::cube::{Cube, face_direction};
+use skinfit::model::effects::{Effect, Effects};
 use skinfit::scene::maps::{Environment, Map, Spots};
 use skinfit::scene::mesh::PosedMesh;
 
+use crate::by_rules::Function;
 use crate::common;
+use crate::sky::effect;
 use crate::vectors;
 use crate::vectors::reader::{Node, Tolerance, Vectors};
 
@@ -293,11 +296,23 @@ pub(crate) fn add_band(mesh: &mut PosedMesh, axis: DVec3, [from, to]: [f64; 2]) 
     }
 }
 
+/// By the rule and its tangents.
 fn bounce_vector(file: &Node<'_>) {
+    const RULE: &str = "open_to_sky_and_skin";
+    let effects = Effects::of(&[Effect::Diffuse, effect("directional_occlusion")]);
+    let value = Function::of_rule(effects, RULE, &[3, 3]);
+    let along = |moved: usize| Function::tangent_of_rule(effects, RULE, &[3, 3], moved);
+    let [by_open, by_albedo] = [0, 1].map(along);
     let [open, albedo] = ["occ", "albedo"].map(|name| file.at("inputs").at(name).numbers());
     let all = || open.iter().flat_map(|&open| albedo.iter().map(move |&albedo| (open, albedo)));
-    for (k, name) in ["value", "d_occ", "d_albedo"].into_iter().enumerate() {
-        let got: Vec<f64> = all().map(|(open, albedo)| bounce_polynomial(open, albedo)[k]).collect();
-        file.vector.tolerances().double.check(name, &got, &file.at("expected").at(name));
-    }
+    let tolerance = file.vector.tolerances().double;
+    let check = |name: &str, of: &dyn Fn([f64; 3], [f64; 3]) -> Vec<f64>| {
+        let got: Vec<f64> = all().map(|(open, albedo)| of([open; 3], [albedo; 3])[0]).collect();
+        tolerance.check(name, &got, &file.at("expected").at(name));
+    };
+    check("value", &|open, albedo| value.of(1.0, &[&open, &albedo]));
+    // Where nothing is open both branches are 0; the vectors have the slope from above.
+    let above = |open: [f64; 3]| open.map(|open| open.max(1e-15));
+    check("d_occ", &|open, albedo| by_open.of(1.0, &[&above(open), &albedo, &[1.0; 3]]));
+    check("d_albedo", &|open, albedo| by_albedo.of(1.0, &[&above(open), &albedo, &[1.0; 3]]));
 }

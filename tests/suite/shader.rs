@@ -132,8 +132,9 @@ fn shaders_of_every_effect_set_form_and_silhouette_validate_in_every_kind_of_sce
 /// What a fit of everything that an effect set asks for compiles, over samples and over their terms.
 #[test]
 fn fused_passes_of_every_effect_set_form_and_silhouette_validate() {
+    use skinfit::engine::PassOutputs;
     use skinfit::engine::Unknown;
-    use skinfit::engine::gpu::fused::{Fitted, Fused, Layout, Wish, gather_module, terms_module};
+    use skinfit::engine::gpu::fused::{Fitted, Fused, Layout, gather_module, terms_module};
     use skinfit::model::params::{Channels, Column, Param};
     use skinfit::samples::SurfaceRecords;
     use skinfit::samples::surface_records::{Asked, Places};
@@ -199,7 +200,7 @@ fn fused_passes_of_every_effect_set_form_and_silhouette_validate() {
             [(all, &samples), (kept, &terms)].into_iter().flat_map(|(u, l)| bits.map(|b| (u.clone(), l, b)))
         {
             let fused = Fused::new(fitted(unknowns, layout, bits)).unwrap();
-            fused.slabs(Wish::Normal).iter().for_each(|slab| check(&slab.wgsl));
+            fused.slabs(PassOutputs::Normal).iter().for_each(|slab| check(&slab.wgsl));
             check(&fused.image_module());
         }
     });

@@ -10,7 +10,7 @@ use skinfit::bake::coefficients::Coefficients;
 use skinfit::bake::harmonics::{CONSTANT, Order, open_transfer_at};
 use skinfit::bake::interreflection::Albedo;
 use skinfit::bake::occlusion::bake_occlusion;
-use skinfit::bake::shadowed::shadowed_irradiance;
+use skinfit::bake::shadowed::by_azimuth;
 use skinfit::bake::transfer::{VertexTransfer, bake_transfer};
 use skinfit::model::effects::Effects;
 use skinfit::scene::maps::{Environment, Map, Spots};
@@ -73,7 +73,8 @@ fn a_convex_shape_has_the_transfer_of_its_normals_and_is_lit_as_in_the_open() {
         }
         assert!(baked.base.bounced.as_flattened().iter().all(|&t| t == 0.0));
         let light = Coefficients::of(&light, order);
-        for lit in shadowed_irradiance(&baked.base.direct, order, &light, 0.3) {
+        for turning in by_azimuth(&baked.base.direct, order, &light) {
+            let lit = turning.at(0.3);
             // Y_00 in f32.
             assert!((0..3).all(|c| (lit[c] / [1.0, 0.25, 4.0][c] - 1.0).abs() < 1e-6), "{lit:?}");
         }

@@ -113,18 +113,6 @@ pub fn by_azimuth<T: Share>(transfer: &[T], order: Order, light: &Coefficients) 
     transfer.chunks_exact(order.functions()).map(|transfer| Turning::of(transfer, &light)).collect()
 }
 
-/// Irradiance over pi of each vertex under `light` turned by an angle about +Y, rgb, floored at 0.
-#[must_use]
-pub fn shadowed_irradiance<T: Share>(
-    transfer: &[T],
-    order: Order,
-    light: &Coefficients,
-    radians: f64,
-) -> Vec<[f32; 3]> {
-    let floored = |turning: Turning| turning.at(radians).map(|x| x.max(0.0) as f32);
-    by_azimuth(transfer, order, light).into_iter().map(floored).collect()
-}
-
 /// How much of the open light arrives, a channel, and its derivative by the turn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ratio {
@@ -192,23 +180,6 @@ fn share_above(least: f64, arrived: [f64; 3], open: [f64; 3], mean: [f64; 3]) ->
         true => arrived[c].max(0.0) / open[c].max(least * mean[c]),
         false => 0.0,
     })
-}
-
-/// The light that an occlusion lets through once the surface throws it back at itself (Jimenez et al. 2016,
-/// *Practical Real-Time Strategies for Accurate Indirect Occlusion*), a channel, and its derivatives by occlusion and
-/// by albedo: the cheap choice beside gathered bounces. Where both branches are equal, as for occlusion 0, the
-/// derivatives are those from above.
-#[must_use]
-pub fn bounce_polynomial(open: f64, albedo: f64) -> [f64; 3] {
-    let [a, b, c] =
-        [[2.0404, -0.3324], [-4.7951, 0.6417], [2.7552, 0.6903]].map(|[by, plus]| by * albedo + plus);
-    let value = ((open * a + b) * open + c) * open;
-    let by_open = (3.0 * open * a + 2.0 * b) * open + c;
-    if value > open || (value == open && by_open > 1.0) {
-        let by_albedo = ((2.0404 * open - 4.7951) * open + 2.7552) * open;
-        return [value, by_open, by_albedo];
-    }
-    [open, 1.0, 0.0]
 }
 
 #[cfg(test)]

@@ -162,6 +162,17 @@ pub fn face_sizes(illumination: &crate::bake::Illumination) -> crate::shader::fa
     }
 }
 
+/// What a pass over the samples yields.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum PassOutputs {
+    /// The loss.
+    Loss,
+    /// The loss, J^T r and r^T r.
+    Gradient,
+    /// The loss, J^T J, J^T r and r^T r.
+    Normal,
+}
+
 /// One unknown of a fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Unknown {

@@ -246,7 +246,7 @@ use crate::program::graph::Unary;
                     weighted_residual(Loss::RelativeL2, None, [model, target, 1.0]);
                 assert!(loss >= 0.0 && loss.is_finite(), "{model} {target}: {loss}");
                 assert!(scale > 0.0 && residual.is_finite(), "{model} {target}");
-                // The square of less is no f32.
+                // The square of a smaller difference underflows f32.
                 assert!(loss > 0.0 || (model - target).abs() < 1e-18, "{model} {target}: {loss}");
             }
         }

@@ -76,7 +76,7 @@ pub enum ExportError {
         "within this accuracy the shader filters {resource} by itself, which no export does. Allow a greater error."
     )]
     Filtered {
-        /// What it reads.
+        /// The cube or map that it looks up.
         resource: &'static str,
     },
     /// No shader within the accuracy.

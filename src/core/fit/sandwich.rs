@@ -150,7 +150,7 @@ mod tests {
         (0..SIDE * SIDE).map(|i| draws[i / SIDE / side * across + i % SIDE / side]).collect()
     }
 
-    /// Of one unknown that is the same in every pixel: its pulls are sums of residuals.
+    /// The cluster scores of one unknown whose derivative is 1 in every pixel: sums of residuals.
     fn pulls(residuals: &[f32]) -> Pulls {
         let pixels = residuals.iter().map(|&r| Some([r, 0.0, 0.0, 0.0])).collect();
         let across = SIDE / TILE;

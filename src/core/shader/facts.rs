@@ -65,13 +65,13 @@ pub struct MapFacts {
 /// then. A shader that asks the texture in every lookup takes a tenth longer over a fit's pass (on an H200).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Hash)]
 pub struct FaceSizes {
-    /// Of E_d.
+    /// Of the irradiance E_d.
     pub irradiance: Option<usize>,
-    /// Of E_s, at every exponent.
+    /// Of the specular cubes E_s, at every exponent.
     pub specular: Option<usize>,
-    /// Of E_h.
+    /// Of the hilite cube E_h.
     pub hilite: Option<usize>,
-    /// Of E_r, at every roughness.
+    /// Of the rough reflection's cubes E_r, at every roughness.
     pub reflected: Option<usize>,
 }
 

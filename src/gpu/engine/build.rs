@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use web_time::Instant;
 
-use super::fused::{Layout, Wish, held_parameters};
+use super::fused::{Layout, held_parameters};
 use super::levels::DeviceLevels;
 use super::lights::DeviceLights;
 use super::parts::{Parts, Traits};
@@ -13,7 +13,7 @@ use super::{DeviceSamples, GpuEngine, Memory, OnDevice, Written};
 use crate::model::terms::TermName;
 use crate::{Gpu, GpuError};
 use skinfit_core::engine::view::ObservedView;
-use skinfit_core::engine::{Point, Task, Unknown};
+use skinfit_core::engine::{PassOutputs, Point, Task, Unknown};
 
 impl GpuEngine {
     /// An engine for a task; the shaders for passes at `start` are compiled.
@@ -93,7 +93,7 @@ impl GpuEngine {
         }
         engine.set_stride(1);
         // Whatever the driver refuses shows here, and not in the midst of a fit.
-        engine.sums(start, Wish::Normal)?;
+        engine.sums(start, PassOutputs::Normal)?;
         Ok(engine)
     }
 

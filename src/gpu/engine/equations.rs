@@ -3,12 +3,12 @@
 use std::sync::PoisonError;
 
 use super::GpuEngine;
-use super::fused::{ColumnOf, Sum, Wish};
-use skinfit_core::engine::{Engine, NormalEquations, Point, Unknown};
+use super::fused::{ColumnOf, Sum};
+use skinfit_core::engine::{Engine, NormalEquations, PassOutputs, Point, Unknown};
 
 impl GpuEngine {
     /// A pass as normal equations; after a fault, numbers that no solver takes.
-    pub(super) fn pass(&self, point: &Point, wish: Wish) -> NormalEquations {
+    pub(super) fn pass(&self, point: &Point, wish: PassOutputs) -> NormalEquations {
         let channels: u32 = if self.alpha { 4 } else { 3 };
         let k = self.unknowns.len();
         let mut total = NormalEquations {

@@ -33,7 +33,7 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use self::equations::Passed;
-use self::fused::{Fitted, Fused, Layout, Looked, Wish};
+use self::fused::{Fitted, Fused, Layout, Looked};
 use self::images::Images;
 use self::levels::DeviceLevels;
 use self::lights::DeviceLights;
@@ -50,7 +50,7 @@ use crate::scene::Loss;
 use crate::shader::facts::FaceSizes;
 use crate::{Gpu, GpuError};
 use skinfit_core::engine::view::ObservedView;
-use skinfit_core::engine::{BLOCK, Point, Unknown};
+use skinfit_core::engine::{BLOCK, PassOutputs, Point, Unknown};
 
 /// How much of the device is used.
 #[derive(Clone, Copy, Debug, Default)]
@@ -95,7 +95,7 @@ struct OnDevice {
     /// Where something is computed in texels.
     levels: Option<DeviceLevels>,
     /// By wish, and by what is written into the text.
-    programs: BTreeMap<(Wish, Written), Program>,
+    programs: BTreeMap<(PassOutputs, Written), Program>,
     /// What the terms were made with that stand in the samples' place.
     terms: Option<Vec<[f64; 3]>>,
     /// Whether terms stand there, perhaps in some parts only.
@@ -133,7 +133,7 @@ impl GpuEngine {
     pub fn bytes(&self) -> (u64, u64) {
         let device = self.lock();
         let (held, streamed) = device.parts.bytes();
-        let normal = device.programs.iter().find(|((wish, _), _)| *wish == Wish::Normal);
+        let normal = device.programs.iter().find(|((wish, _), _)| *wish == PassOutputs::Normal);
         (held, streamed * normal.map_or(1, |(_, program)| program.shaders()))
     }
 
@@ -238,7 +238,7 @@ impl GpuEngine {
     }
 
     /// One pass: for each part of each view its sums.
-    fn sums(&self, point: &Point, wish: Wish) -> Result<Passed, GpuError> {
+    fn sums(&self, point: &Point, wish: PassOutputs) -> Result<Passed, GpuError> {
         let written = self.written(point);
         let mut device = self.lock();
         self.keep(point, &mut device)?;

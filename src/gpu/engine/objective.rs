@@ -3,13 +3,14 @@
 use std::sync::Arc;
 
 use super::GpuEngine;
-use super::fused::Wish;
 use crate::GpuError;
 use crate::scene::Loss;
 use skinfit_core::engine::cpu::CpuEngine;
 use skinfit_core::engine::pulls::Pulls;
 use skinfit_core::engine::view::ObservedView;
-use skinfit_core::engine::{Engine, EngineError, NormalEquations, Objective, Point, Task, Unknown};
+use skinfit_core::engine::{
+    Engine, EngineError, NormalEquations, Objective, PassOutputs, Point, Task, Unknown,
+};
 
 impl Objective for GpuEngine {
     fn unknowns(&self) -> &[Unknown] {
@@ -48,15 +49,15 @@ impl Objective for GpuEngine {
     }
 
     fn normal_equations(&self, point: &Point) -> NormalEquations {
-        self.pass(point, Wish::Normal)
+        self.pass(point, PassOutputs::Normal)
     }
 
     fn loss(&self, point: &Point) -> f64 {
-        self.pass(point, Wish::Loss).loss
+        self.pass(point, PassOutputs::Loss).loss
     }
 
     fn gradient(&self, point: &Point) -> (f64, Vec<f64>) {
-        self.pass(point, Wish::Gradient).loss_and_gradient()
+        self.pass(point, PassOutputs::Gradient).loss_and_gradient()
     }
 }
 

@@ -3,7 +3,7 @@
 use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, ComputePassDescriptor, ComputePipeline};
 
 use super::dispatch::PART_BYTES;
-use super::fused::{ColumnOf, Fused, PARTS, Slab, Sum, Wish, gather_module};
+use super::fused::{ColumnOf, Fused, PARTS, Slab, Sum, gather_module};
 use super::lights::Inputs;
 use super::part::Part;
 use super::parts::Parts;
@@ -13,6 +13,7 @@ use super::pipeline::{
 use crate::model::gain::Gain;
 use crate::readback::map;
 use crate::{Gpu, GpuError};
+use skinfit_core::engine::PassOutputs;
 use skinfit_core::engine::view::ObservedView;
 
 /// The shaders of a wish.
@@ -40,7 +41,7 @@ struct Run {
 }
 
 impl Program {
-    pub(super) fn new(gpu: &Gpu, fused: Fused, wish: Wish, parts: &Parts) -> Result<Self, GpuError> {
+    pub(super) fn new(gpu: &Gpu, fused: Fused, wish: PassOutputs, parts: &Parts) -> Result<Self, GpuError> {
         let inputs = Inputs::new(gpu, &fused.plan);
         let (of_part, of_gather) = (
             part_layout(gpu, parts.have_levels()),

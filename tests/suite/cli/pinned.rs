@@ -36,10 +36,23 @@ struct Pin {
 const BLOCKS: usize = 8;
 
 /// The scanned head's and the posed head's scenes by the paper's model.
-const PLAIN: [&str; 4] = ["lps_forest", "lps_sunrise", "lps_studio", "mh_portrait"];
+const PLAIN: [&str; 5] = ["lps_forest", "lps_sunrise", "lps_studio", "lps_studio_dry", "mh_portrait"];
 
 /// Files of scenes with more than that: with lights, and with diffusion.
 const WHOLE: [&str; 2] = ["lps_studio/light.toml", "lps_forest/full.toml"];
+
+/// Other instructions round a loss by 1e-7 of it; a change of the model that shows moves it by more.
+const OF_A_LOSS: f64 = 1e-6;
+/// A fit ends where a step would gain less than it can measure. What it can, hangs on how a processor's instructions round
+/// sums: at losses that are the same to 1e-8, AVX2 and AVX-512 end up to 0.15 standard errors apart where constants stand
+/// for each other.
+const OF_AN_ERROR: f64 = 0.25;
+/// Errors hang on where a fit ends: by up to 0.7% between those.
+const BETWEEN_ERRORS: f64 = 0.02;
+/// f32 has no more than some 1e-7 of a constant.
+const OF_A_CONSTANT: f64 = 1e-7;
+/// Twice what ends that are so far apart show, of a picture's mean.
+const OF_A_PICTURE: f64 = 1e-4;
 
 /// A scene's text with its paths made absolute, without lamps and materials, which are not of the paper's model.
 pub(super) fn scene_text(data: &Path, scene: &str) -> String {
@@ -134,9 +147,8 @@ fn moved(scene: &str, got: &Pin, pin: &Pin) -> Vec<String> {
         moved.push(format!("{scene}: {} samples instead of {}", got.samples, pin.samples));
     }
     for (end, (got, want)) in ["start", "end"].into_iter().zip(got.losses.into_iter().zip(pin.losses)) {
-        // Other instructions round a loss by 1e-7 of it; a change of the model that shows moves it by more.
         // Where nothing is left, what is left is rounding.
-        if (got - want).abs() > 1e-6 * want + 1e-12 {
+        if (got - want).abs() > OF_A_LOSS * want + 1e-12 {
             moved.push(format!("{scene}: loss at the {end} {got:e} instead of {want:e}"));
         }
     }
@@ -145,12 +157,9 @@ fn moved(scene: &str, got: &Pin, pin: &Pin) -> Vec<String> {
             moved.push(format!("{scene}: {name} is not determined"));
             continue;
         };
-        // A fit ends where a step would gain less than it can measure. What it can, hangs on how a processor's
-        // instructions round sums: at losses that are the same to 1e-8, AVX2 and AVX-512 end up to 0.15 standard errors
-        // apart where constants stand for each other. f32 has no more than some 1e-7 of a constant.
-        let by = 0.25 * error + 1e-7 * want.abs();
-        // Errors hang on where a fit ends: by up to 0.7% between those.
-        if (got - want).abs() > by || (found - error).abs() > 0.02 * error + 1e-7 * want.abs() {
+        let least = OF_A_CONSTANT * want.abs();
+        let differs = (got - want).abs() > OF_AN_ERROR * error + least;
+        if differs || (found - error).abs() > BETWEEN_ERRORS * error + least {
             moved.push(format!("{scene}: {name} {got} +- {found:e} instead of {want} +- {error:e}"));
         }
     }
@@ -159,8 +168,7 @@ fn moved(scene: &str, got: &Pin, pin: &Pin) -> Vec<String> {
         let pairs = got.pictures[view].iter().flatten().zip(want.iter().flatten());
         let most = pairs.map(|(got, want)| (got - want).abs()).fold(0.0, f64::max) / mean;
         println!("{scene}: {view}: {most:e}");
-        // Twice what ends that are so far apart show.
-        if most > 1e-4 {
+        if most > OF_A_PICTURE {
             moved.push(format!("{scene}: {view}: a block is off by {most:e} of the picture's mean"));
         }
     }

@@ -35,7 +35,7 @@ const ROWS: [(&str, [Of; 8]); 23] = [
     ("diffusion2_stretch", [V, V, N, N, N, N, N, N]),
     ("diffusion2_surface", [S, S, N, N, N, N, N, N]),
     ("light", [S, S, S, S, S, S, V, S]),
-    ("sh_bounce", [S, S, S, S, S, S, N, S]),
+    ("sh_bounce", [S, S, S, S, S, S, N, N]),
     ("sh_environment", [N, N, N, N, N, N, N, S]),
     ("sh_transfer", [S, S, S, S, S, S, N, S]),
     ("specular_choices", [S, V, V, N, N, N, V, N]),

@@ -5,15 +5,15 @@ use rayon::prelude::*;
 use super::CpuEngine;
 use super::pass::{ChannelColumns, Pass};
 use super::streams::BATCH;
-use super::sums::{CHUNK, Sums, Wish, pairwise};
+use super::sums::{CHUNK, Sums, pairwise};
 use super::view_pass::with_scratch;
 use crate::engine::gram::pair;
 use crate::engine::pulls::{Gathered, Pulls};
-use crate::engine::{BLOCK, Engine, NormalEquations, Point};
+use crate::engine::{BLOCK, Engine, NormalEquations, PassOutputs, Point};
 use crate::with_simd;
 
 impl CpuEngine {
-    pub(super) fn pass(&self, point: &Point, wish: Wish) -> NormalEquations {
+    pub(super) fn pass(&self, point: &Point, wish: PassOutputs) -> NormalEquations {
         let channels = self.fitted.channels;
         let k = self.fitted.unknowns.len();
         let mut total = NormalEquations {
@@ -30,7 +30,8 @@ impl CpuEngine {
         };
         let pass = &*ready.pass;
         let every: Vec<usize> = (0..channels).collect();
-        let of = if wish == Wish::Loss { (&pass.value, &every[..]) } else { (&pass.moved, &pass.read[..]) };
+        let of =
+            if wish == PassOutputs::Loss { (&pass.value, &every[..]) } else { (&pass.moved, &pass.read[..]) };
         for view in 0..self.views.len() {
             let of_view = self.view_pass(of, &ready, point, view);
             let blocks: Vec<usize> = self.read_blocks(&self.views[view]).collect();
@@ -93,19 +94,20 @@ impl CpuEngine {
     }
 
     /// One view's packed sums into the full matrices.
-    fn add(&self, view: usize, pass: &Pass, sums: &Sums, wish: Wish, total: &mut NormalEquations) {
+    fn add(&self, view: usize, pass: &Pass, sums: &Sums, wish: PassOutputs, total: &mut NormalEquations) {
         let Some(loss) = sums.0.last() else { return };
         total.loss += loss;
         let k = self.fitted.unknowns.len();
         let mut base = 0;
-        for unknown in self.columns(view, pass).iter().filter(|_| wish != Wish::Loss) {
+        for unknown in self.columns(view, pass).iter().filter(|_| wish != PassOutputs::Loss) {
             let (columns, count) = (unknown.len(), unknown.len() + 1);
             // Of a gradient there is the last column alone.
-            let entry = |i: usize, j: usize| if wish == Wish::Gradient { i } else { pair(i, j, count) };
+            let entry =
+                |i: usize, j: usize| if wish == PassOutputs::Gradient { i } else { pair(i, j, count) };
             for i in 0..columns {
                 let Some(a) = unknown[i] else { continue };
                 total.jtr[a] += sums.0[base + entry(i, columns)];
-                for j in (i..columns).filter(|_| wish == Wish::Normal) {
+                for j in (i..columns).filter(|_| wish == PassOutputs::Normal) {
                     let Some(b) = unknown[j] else { continue };
                     let value = sums.0[base + entry(i, j)];
                     total.jtj[a * k + b] += value;
@@ -115,7 +117,7 @@ impl CpuEngine {
                 }
             }
             total.residual += sums.0[base + entry(columns, columns)];
-            base += if wish == Wish::Gradient { count } else { count * (count + 1) / 2 };
+            base += if wish == PassOutputs::Gradient { count } else { count * (count + 1) / 2 };
         }
     }
 }

@@ -22,7 +22,7 @@ pub(super) struct Fitted {
 }
 
 impl Fitted {
-    /// Of views of one kind.
+    /// Of views whose samples have the same layout.
     pub(super) fn new(setup: Setup, unknowns: Vec<Unknown>, views: &[ObservedView]) -> Self {
         let channels = if views.iter().any(ObservedView::compares_alpha) { 4 } else { 3 };
         let places = views

@@ -3,10 +3,9 @@
 use std::sync::Arc;
 
 use super::CpuEngine;
-use super::sums::Wish;
 use crate::engine::pulls::Pulls;
 use crate::engine::view::ObservedView;
-use crate::engine::{Engine, EngineError, NormalEquations, Objective, Point, Unknown};
+use crate::engine::{Engine, EngineError, NormalEquations, Objective, PassOutputs, Point, Unknown};
 use crate::scene::Loss;
 
 impl Objective for CpuEngine {
@@ -31,15 +30,15 @@ impl Objective for CpuEngine {
     }
 
     fn normal_equations(&self, point: &Point) -> NormalEquations {
-        self.pass(point, Wish::Normal)
+        self.pass(point, PassOutputs::Normal)
     }
 
     fn loss(&self, point: &Point) -> f64 {
-        self.pass(point, Wish::Loss).loss
+        self.pass(point, PassOutputs::Loss).loss
     }
 
     fn gradient(&self, point: &Point) -> (f64, Vec<f64>) {
-        self.pass(point, Wish::Gradient).loss_and_gradient()
+        self.pass(point, PassOutputs::Gradient).loss_and_gradient()
     }
 }
 

@@ -6,14 +6,6 @@ use crate::samples::LANES;
 /// Blocks in a chunk: one unit of work, and 64 terms a lane.
 pub(super) const CHUNK: usize = 4;
 
-/// What a pass yields.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Wish {
-    Loss,
-    Gradient,
-    Normal,
-}
-
 /// Packed sums of a chunk: each channel's triangle (or its last column), then the loss.
 pub(super) struct Sums(pub(super) Vec<f64>);
 

@@ -8,13 +8,13 @@ use super::machine;
 use super::pass::ChannelColumns;
 use super::program::Bound;
 use super::streams::{BATCH, Column, FileColumns, Stream, StreamOf, load, store};
-use super::sums::{Sums, Wish, fold};
-use crate::engine::BLOCK;
+use super::sums::{Sums, fold};
 use crate::engine::gram::add_gram;
 use crate::engine::lanes::Lanes;
 use crate::engine::levels::{Corners, Finder};
 use crate::engine::residual::Residuals;
 use crate::engine::view::ObservedView;
+use crate::engine::{BLOCK, PassOutputs};
 use crate::model::real::Real;
 use crate::samples::LANES;
 use crate::samples::rows::Row;
@@ -311,19 +311,19 @@ impl ViewPass<'_> {
         simd: S,
         channels: &[ChannelColumns],
         blocks: &[usize],
-        wish: Wish,
+        wish: PassOutputs,
         scratch: &mut Scratch,
     ) -> Sums {
         let groups = self.view.samples.groups();
         let size = |channel: &ChannelColumns| match (wish, channel.unknowns.len() + 1) {
-            (Wish::Loss, _) => 0,
-            (Wish::Gradient, count) => count,
-            (Wish::Normal, count) => count * (count + 1) / 2,
+            (PassOutputs::Loss, _) => 0,
+            (PassOutputs::Gradient, count) => count,
+            (PassOutputs::Normal, count) => count * (count + 1) / 2,
         };
         let mut sums = std::mem::take(&mut scratch.sums);
         sums.clear();
         sums.resize(channels.iter().map(size).sum(), Row::ZERO);
-        let wanted = if wish == Wish::Normal { channels } else { &[] };
+        let wanted = if wish == PassOutputs::Normal { channels } else { &[] };
         let columns: Vec<Vec<&Column>> =
             wanted.iter().enumerate().map(|(c, channel)| self.columns(scratch, channel, c)).collect();
         let (mut loss, batch) = (Lanes::splat(simd, 0.0), self.bound.batch());
@@ -338,9 +338,11 @@ impl ViewPass<'_> {
                     loss = loss + self.compare(simd, c, (shown, compared), first, count);
                     let sums = &mut sums[base..];
                     match wish {
-                        Wish::Loss => {}
-                        Wish::Gradient => self.add_slope(simd, (c, channel), (shown, compared), count, sums),
-                        Wish::Normal => {
+                        PassOutputs::Loss => {}
+                        PassOutputs::Gradient => {
+                            self.add_slope(simd, (c, channel), (shown, compared), count, sums);
+                        }
+                        PassOutputs::Normal => {
                             self.weigh(simd, channel, scratch, c, count);
                             add_gram(simd, FileColumns { columns: &columns[c], groups: count }, sums);
                         }

@@ -234,7 +234,7 @@ impl Writer<'_> {
         arguments: &[Handle<E>],
         d: &[String],
     ) -> Result<Option<String>, TangentError> {
-        // Of a product's two terms those that move.
+        // The product rule, without the terms whose factor does not move.
         let product = |name: &str, a: &[String]| {
             let terms =
                 [(0, format!("{name}({}, {})", d[0], a[1])), (1, format!("{name}({}, {})", a[0], d[1]))];

@@ -31,7 +31,7 @@ use crate::scene::Loss;
 use crate::shader::emit::{Plan, plan};
 use crate::shader::facts::{FaceSizes, Facts};
 use crate::shader::tangent::chain::{Chain, Seed};
-use skinfit_core::engine::{BLOCK, Unknown};
+use skinfit_core::engine::{BLOCK, PassOutputs, Unknown};
 use skinfit_core::program::levels::LevelProgram;
 use skinfit_core::program::lower::LowerError;
 
@@ -43,17 +43,6 @@ pub const PARTS: usize = 16;
 const BLOCK_PIXELS: usize = BLOCK * LANES;
 /// Sums that a thread keeps: they and the columns should fit 255 registers.
 const MOST_SUMS: usize = 112;
-
-/// What a pass yields.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Wish {
-    /// The loss.
-    Loss,
-    /// The loss, J^T r and r^T r.
-    Gradient,
-    /// The loss, J^T J, J^T r and r^T r.
-    Normal,
-}
 
 /// What is the same for every view of a fit.
 #[derive(Clone, Debug)]
@@ -180,7 +169,7 @@ impl Fused {
 
     /// The shaders that yield a wish; most fits have one.
     #[must_use]
-    pub fn slabs(&self, wish: Wish) -> Vec<Slab> {
+    pub fn slabs(&self, wish: PassOutputs) -> Vec<Slab> {
         let sums = self.sums(wish);
         sums.chunks(MOST_SUMS).map(|sums| Slab { sums: sums.to_vec(), wgsl: self.module(sums) }).collect()
     }
@@ -205,16 +194,16 @@ impl Fused {
     }
 
     /// The sums of a wish; products of two columns that share no colour channel are 0 and left out.
-    fn sums(&self, wish: Wish) -> Vec<Sum> {
+    fn sums(&self, wish: PassOutputs) -> Vec<Sum> {
         let k = self.columns.len();
         let meet = |i: usize, j: usize| self.moved(i).and(self.moved(j)) != Moved::NONE;
         let mut sums = vec![Sum::Loss];
-        if wish == Wish::Normal {
+        if wish == PassOutputs::Normal {
             for i in 0..k {
                 sums.extend((i..k).filter(|&j| meet(i, j)).map(|j| Sum::Product(i, j)));
             }
         }
-        if wish != Wish::Loss {
+        if wish != PassOutputs::Loss {
             sums.extend((0..=k).map(|i| Sum::Product(i, k)));
         }
         sums
