@@ -1,11 +1,15 @@
 //! What the documents say of the program, where it can be checked.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use skinfit::model::choices::Choices;
 use skinfit::model::effects::Effect;
+use skinfit::model::readings::Form;
 use skinfit::shader::rule::LIBRARY;
 use skinfit::shader::term::register;
+use skinfit::shader::{Facts, Resource};
 
 use crate::every_effect::every_effect;
 
@@ -73,6 +77,30 @@ fn the_page_of_shaders_names_every_file_of_functions() {
     let named: Vec<&str> =
         row.split('`').skip(1).step_by(2).skip(1).filter(|word| *word != "rules/lib").collect();
     assert_eq!(named, LIBRARY.map(|(name, _)| name));
+}
+
+/// What stands in code marks in the page of shaders from a line on, up to the next line that is as `end`.
+fn marked(from: &str, end: &str) -> BTreeSet<String> {
+    let page = std::fs::read_to_string(root().join("docs/shaders.md")).unwrap();
+    let lines: Vec<&str> =
+        page.lines().skip_while(|line| !line.starts_with(from)).take_while(|line| !line.starts_with(end)).collect();
+    lines.join(" ").split('`').skip(1).step_by(2).map(str::to_owned).collect()
+}
+
+#[test]
+fn the_page_of_shaders_names_every_condition_and_every_resource() {
+    let mut conditions = marked("What `when` knows", "What `reads` knows");
+    // Parameters, keys and what stands for a name; each of the others is known.
+    for other in ["when", "rim_exponent", "has_NAME_map"] {
+        assert!(conditions.remove(other), "{other}");
+    }
+    let forms = Form::ALL.map(Form::name);
+    let known = Facts::CONDITIONS.iter().chain(&Choices::CONDITIONS).chain(&forms);
+    assert_eq!(conditions, known.map(|&condition| condition.to_owned()).collect());
+
+    let mut resources = marked("What `reads` knows", "(A sample may hold");
+    assert!(resources.remove("reads"));
+    assert_eq!(resources, Resource::BUILT_IN.map(|resource| resource.name().to_owned()).into());
 }
 
 /// The project's pages, by their paths in it.

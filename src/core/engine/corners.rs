@@ -24,7 +24,7 @@ impl<S: Simd> Corners<S> {
         // Four numbers a texel. Through memory: taking sixteen numbers out of a register costs more.
         let Line(first) = std::hint::black_box(Line((first << 2).to_array()));
         // Slices of equal length, so that one check of an index covers all four corners.
-        let numbers = texels.as_flattened();
+        let numbers: &[f32] = bytemuck::cast_slice(texels);
         let count = numbers.len() - 4 * row;
         let (upper, lower) = (&numbers[..count], &numbers[4 * row..][..count]);
         let mut rows = [[f32x16::splat(simd, 0.0); 8]; 2];
@@ -56,15 +56,15 @@ struct Line([i32; LANES]);
 /// meanwhile, sixteen registers where four will do.
 #[inline(always)]
 pub(super) fn made_here<S: Simd, const N: usize>(numbers: [Lanes<S>; N]) -> [Lanes<S>; N] {
-    let lines = numbers.map(|number| {
-        let mut row = Row::ZERO;
-        number.store(&mut row);
-        row
-    });
+    // In loops: what makes an array of a closure's values is a call of its own, with registers of its own.
+    let mut lines = [Row::ZERO; N];
+    for k in 0..N {
+        numbers[k].store(&mut lines[k]);
+    }
     let lines = std::hint::black_box(&lines);
     let mut made = numbers;
-    for (made, line) in made.iter_mut().zip(lines) {
-        *made = Lanes::of_row(made.0.simd, line);
+    for k in 0..N {
+        made[k] = Lanes::of_row(made[k].0.simd, &lines[k]);
     }
     made
 }

@@ -56,6 +56,7 @@ fn add_tiles<S: Simd>(simd: S, columns: impl Source, sums: &mut [Row]) {
 }
 
 /// Where entry (i, j), i <= j, of `count` columns stands in the packed upper triangle.
+#[inline(always)]
 pub(super) const fn pair(i: usize, j: usize, count: usize) -> usize {
     i * count - i * (i + 1) / 2 + j
 }

@@ -14,7 +14,7 @@ use crate::model::params::{Param, Params};
 use crate::shader::Resource;
 use crate::shader::atlas::Level;
 use crate::shader::quantity::Kind;
-use crate::shader::{Plan, facts::Facts, plan};
+use crate::shader::{Plan, cited, facts::Facts, plan};
 
 /// The function `skinfit_shade`, its constants and declarations.
 pub(super) fn text(
@@ -54,7 +54,7 @@ pub(super) fn code(dialect: &Dialect, plan: &Plan, resources: &[Resource], param
     let fields: Vec<&str> =
         plan.surface().iter().chain(&plan.texel_surface()).map(|(name, _)| *name).collect();
     let wgsl = names::prefixed(&plan.function(), &constants, &read, &fields);
-    let functions = dialect.filtering(&translate(dialect, &names::cited(&wgsl)), filter);
+    let functions = dialect.filtering(&translate(dialect, &cited(&wgsl)), filter);
     if dialect.family == Family::Msl {
         let body = indented(&format!("{declared}\n{functions}"));
         let _ = write!(

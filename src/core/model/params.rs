@@ -150,7 +150,7 @@ macro_rules! row {
 pub static TABLE: [ParamInfo; Param::COUNT] = [
     //  param               name                   listing corrected  bounds        unit  rgb   linear scale  asked for by
     row!(BaseWeight          "base_weight",          0.0,  1.0,  [0.0, INF],       "",        true,  true,  Linear, [Diffuse, Lights],
-         "MODEL 3 (corrected form)", "share of the diffuse light seen from any angle"),
+         "model.md 3 (corrected form)", "share of the diffuse light seen from any angle"),
     row!(RimWeight           "rim_weight",           1.0,  0.5,  [-INF, INF],      "",        true,  true,  Linear, [Diffuse, Lights],
          "listing 3-4, SkinSilhouetteVec.y", "diffuse light added towards the silhouette"),
     row!(RimExponent         "rim_exponent",         2.0,  2.0,  [0.25, 16.0],     "",        false, false, Linear, [Lights, Diffuse, Hilite],
@@ -164,11 +164,11 @@ pub static TABLE: [ParamInfo; Param::COUNT] = [
     row!(Occlusion           "occlusion",            1.0,  1.0,  [0.0, 1.0],       "",        false, false, Linear, [Occlusion],
          "listing 3-4, SkinSilhouetteVec.x", "how much ambient occlusion darkens (0 none, 1 as baked)"),
     row!(NormalStrength      "normal_strength",      1.0,  1.0,  [0.0, 4.0],       "",        false, false, Linear, [NormalMap],
-         "MODEL 3 (corrected form)", "scale of the normal map's slopes"),
+         "model.md 3 (corrected form)", "scale of the normal map's slopes"),
     row!(SpecularLobe        "specular_lobe",        32.0, 32.0, [1.0, 2048.0],    "Phong exponent", false, false, Log, [SideSpecular, Reflection, Haze, Bloom],
-         "MODEL 4", "sharpness of the specular cube"),
+         "model.md 4", "sharpness of the specular cube"),
     row!(scene: EnvironmentRotation "environment_rotation", 0.0,  0.0,  [-INF, INF],      "degrees", false, false, Linear, [Diffuse, Lights, SideSpecular, Hilite, Reflection, Haze, Bloom],
-         "MODEL 1", "turn of the environment about +Y, on top of the scene's own"),
+         "model.md 1", "turn of the environment about +Y, on top of the scene's own"),
     row!(HazeWeight          "haze_weight",          1.0,  1.0,  [0.0, INF],       "",        false, true,  Linear, [Haze, Bloom],
          "listing 3-4, alpha", "weight of the haze written to alpha"),
     row!(scene: KeyAzimuth          "key_azimuth",          0.0,  0.0,  [-INF, INF],      "degrees", false, false, Linear, [KeyLight],

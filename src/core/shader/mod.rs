@@ -11,7 +11,8 @@
 //! - [`search`]: the cheapest set of rules within the accuracy budget (A*); `graph`: what it searches
 //! - [`emit`]: the plan: the chosen rules, and what they read; `calls`: declarations, functions and calls; `module`: its
 //!   WGSL, for rasterised fragments, for stored samples, or as a function for other engines; [`visibility_buffer`]: for
-//!   compute shaders that shade what the rasteriser found; `vertex_stage`: a vertex stage that is one; `fetches`: what it costs at the least
+//!   compute shaders that shade what the rasteriser found; `vertex_stage`: a vertex stage that is one; `fetches`: what it costs at the least;
+//!   `cited`: its citations as its reader finds them
 //! - [`atlas`]: passes over the UV atlas, their text and their tangents
 //! - [`kept`]: what of stored samples need not be computed anew in each pass
 //! - [`term`]: effects, parameters and rules that a file adds
@@ -23,6 +24,7 @@
 pub mod atlas;
 mod bits;
 mod calls;
+mod cited;
 pub mod domain;
 pub mod emit;
 pub mod facts;
@@ -39,6 +41,7 @@ pub mod term;
 pub mod vertex_stage;
 pub mod visibility_buffer;
 
+pub use cited::cited;
 pub use domain::{Domain, Work};
 pub use emit::{Plan, Step, plan};
 pub use facts::{Budget, Facts, Source};

@@ -10,7 +10,7 @@ use crate::model::effects::Effects;
 use crate::scene::Scene;
 use crate::scene::load::LoadOptions;
 use crate::shader::atlas::{Axis, Pass, PassKind};
-use crate::shader::{Budget, Domain, Facts, Plan, plan};
+use crate::shader::{Budget, Domain, Facts, Plan, cited, plan};
 
 /// Print the shader that a scene gets, and the plan behind it
 #[derive(clap::Args)]
@@ -60,7 +60,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         "wgsl" => modules(&plan),
         _ => format!("{}\n{}", table(&plan, "// "), modules(&plan)),
     };
-    write_or_say(arguments.output.as_deref(), &text)?;
+    write_or_say(arguments.output.as_deref(), &cited(&text))?;
     Ok(Exit::Done)
 }
 

@@ -24,6 +24,7 @@ pub(super) struct Block<'a> {
 }
 
 impl<'a> Block<'a> {
+    #[inline(always)]
     fn stream(&self, stream: StreamOf) -> Stream<'a> {
         self.streams[stream as usize]
     }
@@ -54,8 +55,9 @@ impl<'a> Block<'a> {
         let stride = self.stride();
         let mut fields: [&[Row]; N] = [&[]; N];
         // In a loop: what a function calls that makes arrays is not made part of this one.
-        for (field, &(stream, place)) in fields.iter_mut().zip(self.loads) {
-            *field = match stream {
+        for k in 0..N.min(self.loads.len()) {
+            let (stream, place) = self.loads[k];
+            fields[k] = match stream {
                 StreamOf::Samples => &self.stream(stream).rows[self.first * stride + place..],
                 StreamOf::Neutral => {
                     let rows = self.stream(stream).rows;

@@ -102,13 +102,21 @@ fn put<S: Simd, const N: usize>(rows: &[&Rows; N], i: usize, values: [Lanes<S>; 
 }
 
 impl File {
-    fn three(&self, registers: [Register; 3]) -> [&Rows; 3] {
-        registers.map(|register| &self.registers[register])
+    #[inline(always)]
+    fn three(&self, [x, y, z]: [Register; 3]) -> [&Rows; 3] {
+        [&self.registers[x], &self.registers[y], &self.registers[z]]
     }
 
     /// The registers of a call's parts; what nobody reads has one, too.
+    #[inline(always)]
     fn parts<const N: usize>(&self, parts: &[Option<Register>]) -> [&Rows; N] {
-        std::array::from_fn(|k| &self.registers[parts.get(k).copied().flatten().unwrap_or(self.nobody)])
+        let mut found = [&self.registers[self.nobody]; N];
+        for k in 0..N.min(parts.len()) {
+            if let Some(register) = parts[k] {
+                found[k] = &self.registers[register];
+            }
+        }
+        found
     }
 }
 

@@ -54,6 +54,7 @@ pub(super) fn neutral_rows(stride: usize) -> Vec<Row> {
 }
 
 /// The first of the rows of one of [`NEUTRALS`].
+#[inline(always)]
 pub(super) const fn first_neutral(rows: &[Row], which: usize) -> usize {
     which * (rows.len() / NEUTRALS.len())
 }
@@ -78,9 +79,11 @@ pub(super) struct FileColumns<'a> {
 }
 
 impl GramSource for FileColumns<'_> {
+    #[inline(always)]
     fn columns(&self) -> usize {
         self.columns.len()
     }
+    #[inline(always)]
     fn groups(&self) -> usize {
         self.groups
     }

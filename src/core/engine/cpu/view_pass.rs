@@ -132,11 +132,16 @@ impl Scratch {
 
 impl ViewPass<'_> {
     /// Whether every residual counts alike, and as it is.
+    #[inline]
     fn is_plain(&self) -> bool {
+        let [red, green, blue, coverage] = self.gain;
         self.loss == Loss::L2
             && self.view.weight.is_empty()
             && self.view.clip.is_none()
-            && self.gain == [1.0; 4]
+            && red == 1.0
+            && green == 1.0
+            && blue == 1.0
+            && coverage == 1.0
     }
 
     /// The outputs of `count` groups from `first` on.
@@ -196,11 +201,11 @@ impl ViewPass<'_> {
         for start in groups.clone().step_by(batch) {
             let count = batch.min(groups.end - start);
             let shown = self.shown(simd, scratch, start, count);
-            for ((column, plane), gain) in shown.iter().zip(planes.iter_mut()).zip(self.gain) {
-                let gain = Lanes::splat(simd, gain);
-                let rows = plane[(start - groups.start) * LANES..].chunks_exact_mut(LANES);
-                for (i, row) in rows.enumerate().take(count) {
-                    row.copy_from_slice(&(gain * load(simd, &column[i])).to_array());
+            for c in 0..planes.len() {
+                let gain = Lanes::splat(simd, self.gain[c]);
+                let rows = planes[c][(start - groups.start) * LANES..].as_chunks_mut::<LANES>().0;
+                for i in 0..count {
+                    (gain * load(simd, &shown[c][i])).store(&mut rows[i]);
                 }
             }
         }
@@ -391,6 +396,7 @@ impl ViewPass<'_> {
 
     /// What multiplies a channel's column: the value moves by the view's gain times what the model's does, and along the gain
     /// itself by the model's value.
+    #[inline]
     fn gain_of(&self, channel: usize, unknown: Option<usize>) -> f32 {
         if unknown.is_some() { self.gain[channel] } else { 1.0 }
     }

@@ -205,6 +205,7 @@ impl<R: Number> LevelMaker<R> {
 
 impl<R> Finder<R> {
     /// Rows of a record.
+    #[inline]
     #[must_use]
     pub const fn rows(&self) -> usize {
         self.rows

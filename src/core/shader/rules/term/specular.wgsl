@@ -5,10 +5,10 @@
 // effect: light_specular upon lights asks lights, the lights in the skin's specular lobe
 // parameter: specular_weight = 1 in [0, inf), rgb, linear, weighs fresnel, weighs light_specular; weight of specular light; Kelemen and Szirmay-Kalos 2001
 // parameter: roughness = 0.35 in [0.05, 1]; root mean square slope of the surface; Beckmann and Spizzichino 1963
-// parameter: gloss = 0 in [0, 0.9]; how much the specular map lowers the roughness; MODEL 9
+// parameter: gloss = 0 in [0, 0.9]; how much the specular map lowers the roughness; model.md 9
 // parameter: f0 = 0.028 in [0, 0.2]; reflectance when facing; Schlick 1994
-// parameter: f0_floor = 0.3 in [0, 1]; share of f0 where the specular map is black, if it scales f0; MODEL 9
-// parameter: fresnel_loss = 1 in [0, 1], of fresnel; how much of what is reflected the diffuse light lacks; MODEL 9
+// parameter: f0_floor = 0.3 in [0, 1]; share of f0 where the specular map is black, if it scales f0; model.md 9
+// parameter: fresnel_loss = 1 in [0, 1], of fresnel; how much of what is reflected the diffuse light lacks; model.md 9
 // sample_field: lobe_seen: f32 = 1; open share of the specular lobe, by rays
 // sample_field: lobe_sharp: vec3f = 0; light of the specular lobe by rays, over what its share is, at a roughness
 // sample_field: lobe_middle: vec3f = 0; the same at a greater one

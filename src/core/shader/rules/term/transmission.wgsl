@@ -2,7 +2,7 @@
 // Brisebois and Bouchard 2011, Approximating Translucency for a Fast, Cheap and Convincing Subsurface Scattering Look).
 //
 // effect: transmission bakes environment, light that comes through thin parts of the skin
-// parameter: transmission_weight = 0 in [0, inf), rgb, linear, weighs transmission; weight of light that comes through; MODEL 11
+// parameter: transmission_weight = 0 in [0, inf), rgb, linear, weighs transmission; weight of light that comes through; model.md 11
 // parameter: transmission_length = (3.7, 1.4, 0.7) in [0.05, 50], rgb, log, unit mm; how far light comes through skin before an e-th is left; Jensen et al. 2001
 // parameter: transmission_unit = 1000 in [0, inf), held; millimetres in a unit of the scene; [mesh] metres_per_unit
 // sample_field: thickness: f32 = 4000; millimetres from the surface to the far side, along -N
