@@ -82,8 +82,11 @@ fn the_page_of_shaders_names_every_file_of_functions() {
 /// What stands in code marks in the page of shaders from a line on, up to the next line that is as `end`.
 fn marked(from: &str, end: &str) -> BTreeSet<String> {
     let page = std::fs::read_to_string(root().join("docs/shaders.md")).unwrap();
-    let lines: Vec<&str> =
-        page.lines().skip_while(|line| !line.starts_with(from)).take_while(|line| !line.starts_with(end)).collect();
+    let lines: Vec<&str> = page
+        .lines()
+        .skip_while(|line| !line.starts_with(from))
+        .take_while(|line| !line.starts_with(end))
+        .collect();
     lines.join(" ").split('`').skip(1).step_by(2).map(str::to_owned).collect()
 }
 

@@ -1,4 +1,4 @@
-//! The graph of quantities under one set of facts: what may be wanted in which domain, and the means that give it.
+//! The graph of quantities under one set of facts: what may be wanted in which domain, and what gives it.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -35,15 +35,15 @@ impl Carried {
     }
 }
 
-/// What gives a quantity.
+/// What gives a quantity: a rule, or an edge from another domain.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Means {
+pub(super) enum Producer {
     Rule(&'static Rule),
     Edge(Carried),
 }
 
-impl Means {
-    /// What it needs, what is there without any means left in.
+impl Producer {
+    /// What it needs, inputs as well.
     fn needs(&self) -> Vec<Want> {
         match self {
             Self::Rule(rule) => rule.needs.iter().map(|(q, _)| (rule.domain, *q)).collect(),
@@ -55,10 +55,10 @@ impl Means {
     }
 }
 
-/// A means within the graph.
+/// How a want may be met: a hyperedge of the graph, from what a producer needs to what it gives.
 #[derive(Debug)]
-pub(super) struct Way {
-    pub(super) means: Means,
+pub(super) struct Derivation {
+    pub(super) producer: Producer,
     /// The wants of it that are not there already.
     pub(super) needs: Bits,
     /// All that it gives.
@@ -74,11 +74,11 @@ pub(super) struct Graph<'a> {
     pub(super) facts: &'a Facts,
     /// The wants, each with its rank: what lies further from the inputs has the greater number.
     wants: BTreeMap<Want, usize>,
-    /// For each want, the ways to it.
-    ways: Vec<Vec<Way>>,
+    /// For each want, its derivations.
+    derivations: Vec<Vec<Derivation>>,
 }
 
-/// What is there without any means.
+/// The inputs: what nothing need give.
 struct Given<'a> {
     /// The names of what vertices have.
     attributes: BTreeSet<&'static str>,
@@ -88,41 +88,42 @@ struct Given<'a> {
     texels: Fields,
 }
 
-/// Of each want the means that give it, with what they need that is not there already.
-type Open = BTreeMap<Want, Vec<(Means, Vec<Want>)>>;
+/// Of each want its producers, with what they need that is no input.
+type Open = BTreeMap<Want, Vec<(Producer, Vec<Want>)>>;
 
 impl<'a> Graph<'a> {
     pub(super) fn new(facts: &'a Facts, fragments: &'a [&'static str]) -> Result<Self, PlanError> {
         let attributes = Attribute::all(facts.setup.effects).map(Attribute::name).collect();
         let given = Given { attributes, fragments, texels: texel_fields(facts) };
-        let open = |means: Means| {
-            let needs = means.needs().into_iter().filter(|&need| !given.has(need)).collect();
-            (means, needs)
+        let with_needs = |producer: Producer| {
+            let needs = producer.needs().into_iter().filter(|&need| !given.has(need)).collect();
+            (producer, needs)
         };
-        let means: Open = all_means(facts)
+        let open: Open = producers(facts)
             .into_iter()
-            .map(|(want, means)| (want, means.into_iter().map(open).collect()))
+            .map(|(want, producers)| (want, producers.into_iter().map(with_needs).collect()))
             .collect();
-        let ranks = ranks(&means)?;
+        let ranks = ranks(&open)?;
         let mut sorted: Vec<Want> = ranks.keys().copied().collect();
         sorted.sort_by_key(|want| (ranks[want], *want));
         let wants: BTreeMap<Want, usize> = sorted.iter().enumerate().map(|(i, want)| (*want, i)).collect();
-        let way = |at: usize, (means, needs): &(Means, Vec<Want>)| -> Option<Way> {
+        let derivation = |at: usize, (producer, needs): &(Producer, Vec<Want>)| -> Option<Derivation> {
             let set = |set: Bits, want: &Want| Some(set.or(&Bits::one(*wants.get(want)?)));
             let needs = needs.iter().try_fold(Bits::default(), set)?;
-            Some(Way {
-                means: *means,
+            Some(Derivation {
+                producer: *producer,
                 needs,
-                gives: gives(means)
+                gives: gives(producer)
                     .filter_map(|want| wants.get(&want))
                     .fold(Bits::one(at), |all, &one| all.or(&Bits::one(one))),
-                cost: cost(facts, means),
-                error: error(facts, means),
+                cost: cost(facts, producer),
+                error: error(facts, producer),
             })
         };
-        let ways = |(at, want): (usize, &Want)| means[want].iter().filter_map(|open| way(at, open)).collect();
-        let ways = sorted.iter().enumerate().map(ways).collect();
-        Ok(Self { facts, wants, ways })
+        let of_want =
+            |(at, want): (usize, &Want)| open[want].iter().filter_map(|open| derivation(at, open)).collect();
+        let derivations = sorted.iter().enumerate().map(of_want).collect();
+        Ok(Self { facts, wants, derivations })
     }
 
     /// A want's number; `None` where nothing gives it.
@@ -130,40 +131,40 @@ impl<'a> Graph<'a> {
         self.wants.get(&want).copied()
     }
 
-    /// The ways to each want, by its number.
-    pub(super) fn ways(&self) -> &[Vec<Way>] {
-        &self.ways
+    /// The derivations of each want, by its number.
+    pub(super) fn derivations(&self) -> &[Vec<Derivation>] {
+        &self.derivations
     }
 }
 
 /// Operations a fragment.
-fn cost(facts: &Facts, means: &Means) -> f64 {
-    match means {
-        Means::Rule(rule) => facts.work.share(rule.domain) * rule.cost(facts),
-        Means::Edge(carried) => carried.cost(facts),
+fn cost(facts: &Facts, producer: &Producer) -> f64 {
+    match producer {
+        Producer::Rule(rule) => facts.work.share(rule.domain) * rule.cost(facts),
+        Producer::Edge(carried) => carried.cost(facts),
     }
 }
 
-fn error(facts: &Facts, means: &Means) -> f64 {
-    match means {
+fn error(facts: &Facts, producer: &Producer) -> f64 {
+    match producer {
         // What the scene names counts beside the budget.
-        Means::Rule(rule) if rule.named => 0.0,
-        Means::Rule(rule) => rule.error(facts),
-        Means::Edge(carried) => carried.error,
+        Producer::Rule(rule) if rule.named => 0.0,
+        Producer::Rule(rule) => rule.error(facts),
+        Producer::Edge(carried) => carried.error,
     }
 }
 
 /// What a rule gives; an edge gives what it is taken for.
-fn gives(means: &Means) -> impl Iterator<Item = Want> {
-    let rule = match means {
-        Means::Rule(rule) => Some(*rule),
-        Means::Edge(_) => None,
+fn gives(producer: &Producer) -> impl Iterator<Item = Want> {
+    let rule = match producer {
+        Producer::Rule(rule) => Some(*rule),
+        Producer::Edge(_) => None,
     };
     rule.into_iter().flat_map(|rule| rule.gives.iter().map(|(quantity, _)| (rule.domain, *quantity)))
 }
 
 impl Given<'_> {
-    /// Whether a want is met without any means: by an attribute, a constant, the vertex' index, or what is given.
+    /// Whether a want is an input: by an attribute, a constant, the vertex' index, or what is given.
     fn has(&self, (domain, quantity): Want) -> bool {
         let constant = Constant::from_name(quantity);
         if domain == Domain::Texel {
@@ -182,22 +183,22 @@ pub(super) fn is_of_the_eye(name: &str) -> bool {
     [Constant::Eye, Constant::ViewProjection].iter().any(|constant| constant.name() == name)
 }
 
-/// Every want that some means gives.
-fn all_means(facts: &Facts) -> BTreeMap<Want, Vec<Means>> {
+/// Every want that has a producer, with its producers.
+fn producers(facts: &Facts) -> BTreeMap<Want, Vec<Producer>> {
     let usable = || rules(facts.setup.effects).filter(|rule| rule.refusal(facts).is_none());
     let open = |edge: &&'static Edge| edge.when.iter().all(|condition| facts.holds(condition) == Some(true));
     let edges: Vec<&'static Edge> = EDGES.iter().filter(open).collect();
     let seen = seen(usable);
-    let mut means: BTreeMap<Want, Vec<Means>> = BTreeMap::new();
+    let mut producers: BTreeMap<Want, Vec<Producer>> = BTreeMap::new();
     for rule in usable() {
         for (quantity, swizzle) in &rule.gives {
-            means.entry((rule.domain, quantity)).or_default().push(Means::Rule(rule));
+            producers.entry((rule.domain, quantity)).or_default().push(Producer::Rule(rule));
             for edge in edges.iter().filter(|edge| edge.from == rule.domain) {
                 let hidden = edge.to == Domain::Texel && seen.contains(quantity);
                 let Some(error) = error_on(edge, rule).filter(|_| !hidden) else { continue };
                 let numbers = if swizzle.is_empty() { components(rule.returns) } else { swizzle.len() };
                 let carried = Carried { edge, quantity, numbers, error };
-                carry(means.entry((edge.to, quantity)).or_default(), carried);
+                carry(producers.entry((edge.to, quantity)).or_default(), carried);
             }
         }
     }
@@ -205,10 +206,10 @@ fn all_means(facts: &Facts) -> BTreeMap<Want, Vec<Means>> {
         Budget::Exact | Budget::Paper => carried.error == 0.0,
         Budget::Within(most) => carried.error <= most,
     };
-    for ways in means.values_mut() {
-        ways.retain(|way| !matches!(way, Means::Edge(carried) if !within(carried)));
+    for of_want in producers.values_mut() {
+        of_want.retain(|producer| !matches!(producer, Producer::Edge(carried) if !within(carried)));
     }
-    means
+    producers
 }
 
 /// How far a rule's quantities are off after an edge; `None` where they do not take it.
@@ -219,17 +220,17 @@ fn error_on(edge: &Edge, rule: &Rule) -> Option<f64> {
     }
 }
 
-/// Add an edge to a want's means. It stands there once: where several rules give the quantity, with the largest of
+/// Add an edge to a want's producers. It stands there once: where several rules give the quantity, with the largest of
 /// their errors.
-fn carry(means: &mut Vec<Means>, carried: Carried) {
-    let there = means.iter_mut().find_map(|means| match means {
-        Means::Edge(there) if there.edge == carried.edge => Some(there),
+fn carry(producers: &mut Vec<Producer>, carried: Carried) {
+    let there = producers.iter_mut().find_map(|producer| match producer {
+        Producer::Edge(there) if there.edge == carried.edge => Some(there),
         _ => None,
     });
     if let Some(there) = there {
         there.error = there.error.max(carried.error);
     } else {
-        means.push(Means::Edge(carried));
+        producers.push(Producer::Edge(carried));
     }
 }
 
@@ -249,15 +250,15 @@ fn seen<I: Iterator<Item = &'static Rule>>(rules: impl Fn() -> I) -> BTreeSet<&'
     }
 }
 
-/// How far each want lies from the inputs: one more than the furthest of its needs, over all means. Wants
+/// How far each want lies from the inputs: one more than the furthest of its needs, over all derivations. Wants
 /// that cannot be met have no rank.
-fn ranks(means: &Open) -> Result<BTreeMap<Want, usize>, PlanError> {
+fn ranks(open: &Open) -> Result<BTreeMap<Want, usize>, PlanError> {
     let mut ranks: BTreeMap<Want, usize> = BTreeMap::new();
     // Each round settles at least one more; cycles would never end, so rounds are counted.
-    for _ in 0..=means.len() {
+    for _ in 0..=open.len() {
         let mut changed = false;
-        for (want, ways) in means {
-            let rank = ways.iter().filter_map(|(_, needs)| {
+        for (want, producers) in open {
+            let rank = producers.iter().filter_map(|(_, needs)| {
                 needs.iter().try_fold(0, |rank: usize, need| Some(rank.max(ranks.get(need)? + 1)))
             });
             if let Some(rank) = rank.max()
@@ -271,6 +272,6 @@ fn ranks(means: &Open) -> Result<BTreeMap<Want, usize>, PlanError> {
             return Ok(ranks);
         }
     }
-    let goals = means.keys().map(|(_, quantity)| *quantity).collect::<Vec<_>>().join(", ");
+    let goals = open.keys().map(|(_, quantity)| *quantity).collect::<Vec<_>>().join(", ");
     Err(PlanError::Circle { goals })
 }

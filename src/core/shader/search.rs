@@ -7,8 +7,8 @@
 //! decides where a quantity is computed as it decides how: a rule costs its operations times how often its domain is
 //! evaluated ([`Work`](super::domain::Work)), an edge what it takes to bring the quantity over. As needs always lie
 //! nearer to the inputs, no quantity is decided upon twice. A rule that gives several quantities pays once.
-//! A state's least cost is the sum, over what it still wants and what every way to that wants in turn, of the cheapest
-//! rule's share: never more than the true cost, so the first solution found is the best. Where there is one way to most
+//! A state's least cost is the sum, over what it still wants and what every derivation of that wants in turn, of the cheapest
+//! rule's share: never more than the true cost, so the first solution found is the best. Where there is one derivation of most
 //! quantities, as for the many alike of a scene's lights, it is nearly the true cost, and the search goes straight.
 
 use pathfinding::directed::astar::astar;
@@ -17,7 +17,7 @@ use super::bits::Bits;
 use super::domain::Domain;
 use super::facts::{Budget, Facts};
 pub use super::graph::Carried;
-use super::graph::{Graph, Means, Way};
+use super::graph::{Derivation, Graph, Producer};
 use super::rule::Rule;
 use super::term;
 use crate::model::effects::{Effect, Effects};
@@ -160,10 +160,10 @@ pub fn search(
         astar(&start, |state| search.successors(state), |state| search.least(state), |s| s.open.is_empty())
             .ok_or_else(no_plan)?;
     let mut found = Found::default();
-    for way in path.windows(2).filter_map(|pair| search.between(pair)) {
-        match way.means {
-            Means::Rule(rule) => found.rules.push(rule),
-            Means::Edge(carried) => found.carried.push(carried),
+    for derivation in path.windows(2).filter_map(|pair| search.between(pair)) {
+        match derivation.producer {
+            Producer::Rule(rule) => found.rules.push(rule),
+            Producer::Edge(carried) => found.carried.push(carried),
         }
     }
     found.carried.reverse();
@@ -185,22 +185,23 @@ pub fn components(wgsl: &str) -> usize {
 /// A graph, and what bounds the cost of a state from below.
 struct Search<'a> {
     graph: &'a Graph<'a>,
-    /// Of each want the cheapest way's share, in whole steps.
+    /// Of each want the cheapest derivation's share, in whole steps.
     cheapest: Vec<u64>,
-    /// Of each want itself, and what every way to it wants in turn.
+    /// Of each want itself, and what every derivation of it wants in turn.
     surely: Vec<Bits>,
 }
 
 impl<'a> Search<'a> {
     fn new(graph: &'a Graph<'a>) -> Self {
-        let share = |way: &Way| steps(way) / u64::from(way.gives.count());
-        let cheapest = graph.ways().iter().map(|ways| ways.iter().map(share).min().unwrap_or(0)).collect();
+        let share = |one: &Derivation| steps(one) / u64::from(one.gives.count());
+        let cheapest =
+            graph.derivations().iter().map(|of_want| of_want.iter().map(share).min().unwrap_or(0)).collect();
         // Needs lie nearer to the inputs: theirs are there already.
         let mut surely: Vec<Bits> = Vec::new();
-        for (at, ways) in graph.ways().iter().enumerate() {
+        for (at, of_want) in graph.derivations().iter().enumerate() {
             let beyond =
-                |way: &Way| way.needs.iter().fold(Bits::default(), |all, need| all.or(&surely[need]));
-            let of_all = ways.iter().map(beyond).reduce(|all, way| all.and(&way)).unwrap_or_default();
+                |one: &Derivation| one.needs.iter().fold(Bits::default(), |all, need| all.or(&surely[need]));
+            let of_all = of_want.iter().map(beyond).reduce(|all, one| all.and(&one)).unwrap_or_default();
             surely.push(of_all.or(&Bits::one(at)));
         }
         Self { graph, cheapest, surely }
@@ -209,15 +210,18 @@ impl<'a> Search<'a> {
     fn successors(&self, state: &State) -> Vec<(State, u64)> {
         // The open want that lies furthest from the inputs.
         let Some(at) = state.open.greatest() else { return Vec::new() };
-        self.graph.ways()[at].iter().filter_map(|way| self.step(state, at, way)).collect()
+        self.graph.derivations()[at]
+            .iter()
+            .filter_map(|derivation| self.step(state, at, derivation))
+            .collect()
     }
 
-    fn step(&self, state: &State, at: usize, way: &Way) -> Option<(State, u64)> {
-        let have = state.have.clone().or(&way.gives);
-        let open = state.open.clone().or(&way.needs).without(&have);
+    fn step(&self, state: &State, at: usize, derivation: &Derivation) -> Option<(State, u64)> {
+        let have = state.have.clone().or(&derivation.gives);
+        let open = state.open.clone().or(&derivation.needs).without(&have);
         // What lies beyond is never wanted again: forgetting it makes more states alike.
         let have = have.below(at);
-        let error = (way.error * ERROR_STEPS).ceil() as u64;
+        let error = (derivation.error * ERROR_STEPS).ceil() as u64;
         let error = match self.graph.facts.budget {
             Budget::Within(most) => {
                 let sum = state.error + error;
@@ -226,7 +230,7 @@ impl<'a> Search<'a> {
             // Told by each rule's `refusal`; states that differ by it alone are the same.
             Budget::Exact | Budget::Paper => 0,
         };
-        Some((State { open, have, error }, steps(way)))
+        Some((State { open, have, error }, steps(derivation)))
     }
 
     /// A bound on what is still to be paid at the least.
@@ -235,18 +239,19 @@ impl<'a> Search<'a> {
         wanted.without(&state.have).iter().map(|at| self.cheapest[at]).sum()
     }
 
-    /// The way that leads from one state of a path to the next.
-    fn between(&self, pair: &[State]) -> Option<&Way> {
+    /// The derivation that leads from one state of a path to the next.
+    fn between(&self, pair: &[State]) -> Option<&Derivation> {
         let at = pair[0].open.greatest()?;
-        let taken = self.graph.ways()[at].iter().filter_map(|way| Some((way, self.step(&pair[0], at, way)?)));
-        // Of ways that lead to the same state the path's cost chose the cheapest.
-        let (way, _) =
+        let taken =
+            self.graph.derivations()[at].iter().filter_map(|one| Some((one, self.step(&pair[0], at, one)?)));
+        // Of derivations that lead to the same state the path's cost chose the cheapest.
+        let (derivation, _) =
             taken.filter(|(_, (state, _))| *state == pair[1]).min_by_key(|(_, (_, cost))| *cost)?;
-        Some(way)
+        Some(derivation)
     }
 }
 
-/// A way's cost in whole steps.
-fn steps(way: &Way) -> u64 {
-    (way.cost * COST_STEPS).round() as u64
+/// A derivation's cost in whole steps.
+fn steps(derivation: &Derivation) -> u64 {
+    (derivation.cost * COST_STEPS).round() as u64
 }

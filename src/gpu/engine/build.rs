@@ -8,7 +8,7 @@ use web_time::Instant;
 use super::fused::{Layout, held_parameters};
 use super::levels::DeviceLevels;
 use super::lights::DeviceLights;
-use super::parts::{Parts, Traits};
+use super::parts::{Parts, ViewFormat};
 use super::{DeviceSamples, GpuEngine, Memory, OnDevice, Written};
 use crate::model::terms::TermName;
 use crate::{Gpu, GpuError};
@@ -52,7 +52,7 @@ impl GpuEngine {
             return Err(GpuError::NothingShown);
         }
         let alpha = views.iter().any(ObservedView::compares_alpha);
-        let traits = Traits::of(gpu, &views)?;
+        let format = ViewFormat::of(gpu, &views)?;
         let mut engine = Self {
             gpu: gpu.clone(),
             made,
@@ -64,7 +64,7 @@ impl GpuEngine {
             stride: 1,
             weight: (0.0, 0),
             alpha,
-            traits,
+            format,
             looked_up: Default::default(),
             held: None,
             device: Mutex::new(OnDevice {
@@ -80,7 +80,7 @@ impl GpuEngine {
             views,
         };
         engine.upload(memory)?;
-        let samples = Layout::of_samples(&engine.traits.places, engine.traits.rows);
+        let samples = Layout::of_samples(&engine.format.places, engine.format.rows);
         let terms = Layout::of_terms(setup, &samples);
         let device = engine.device.get_mut().unwrap_or_else(PoisonError::into_inner);
         // What is looked up of the UV atlas stands beside samples, and not beside their terms.
@@ -100,15 +100,15 @@ impl GpuEngine {
     /// Have samples, targets, and room for what is looked up, on the device.
     fn upload(&mut self, memory: Memory) -> Result<(), GpuError> {
         let faces = self.lock().lights.face_sizes();
-        let fitted = |turned| self.fitted(Written { turned, gained: false }, faces);
+        let fitted = |turned| self.fitted(Specialization { turned, gained: false }, faces);
         let levels = DeviceLevels::new(&self.gpu, fitted, &self.views)?;
         if let Some(levels) = &levels {
-            self.traits.levels = levels.rows();
+            self.format.levels = levels.rows();
             self.looked_up = [false, true].map(|turned| levels.looked(turned));
         }
         let shared = levels.as_ref().and_then(DeviceLevels::buffer);
         let start = Instant::now();
-        let parts = Parts::new(&self.gpu, &self.views, &self.traits, memory, (self.made.as_deref(), shared))?;
+        let parts = Parts::new(&self.gpu, &self.views, &self.format, memory, (self.made.as_deref(), shared))?;
         let own = |made: &Arc<DeviceSamples>| made.seconds() + start.elapsed().as_secs_f64();
         self.made_seconds = self.made.as_ref().map_or(0.0, own);
         let device = self.device.get_mut().unwrap_or_else(PoisonError::into_inner);

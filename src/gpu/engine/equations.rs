@@ -34,7 +34,7 @@ impl GpuEngine {
 }
 
 /// What a pass yielded.
-pub(super) struct Passed {
+pub(super) struct PassSums {
     /// For each part, its sums.
     pub(super) sums: Vec<Vec<(Sum, f64)>>,
     pub(super) columns: Vec<ColumnOf>,
@@ -42,7 +42,7 @@ pub(super) struct Passed {
     pub(super) view_of: Vec<usize>,
 }
 
-impl Passed {
+impl PassSums {
     /// Add the parts' sums, in their order.
     fn add_to(&self, total: &mut NormalEquations, unknowns: &[Unknown]) {
         let k = unknowns.len();

@@ -32,12 +32,12 @@ mod terms;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use self::equations::Passed;
+use self::equations::PassSums;
 use self::fused::{Fitted, Fused, Layout, Looked};
 use self::images::Images;
 use self::levels::DeviceLevels;
 use self::lights::DeviceLights;
-use self::parts::{Parts, Traits};
+use self::parts::{Parts, ViewFormat};
 use self::program::Program;
 pub use self::samples::{DeviceSampleError, DeviceSamples};
 use self::terms::replace_samples;
@@ -78,7 +78,7 @@ pub struct GpuEngine {
     /// Sum of weights over the pixels that a pass reads, and how many of them count.
     weight: (f64, u64),
     alpha: bool,
-    traits: Traits,
+    format: ViewFormat,
     /// How samples look up what stands in the UV atlas: where the environment is not turned, and where it is.
     looked_up: [Looked; 2],
     /// The parameters that terms are made with, where terms stand in the place of samples.
@@ -95,13 +95,13 @@ struct OnDevice {
     /// Where something is computed in texels.
     levels: Option<DeviceLevels>,
     /// By wish, and by what is written into the text.
-    programs: BTreeMap<(PassOutputs, Written), Program>,
+    programs: BTreeMap<(PassOutputs, Specialization), Program>,
     /// What the terms were made with that stand in the samples' place.
     terms: Option<Vec<[f64; 3]>>,
     /// Whether terms stand there, perhaps in some parts only.
     replaced: bool,
     /// The forward pass, and what is written into its text: with a term, that one alone.
-    images: Option<((Written, Option<TermName>), Images)>,
+    images: Option<((Specialization, Option<TermName>), Images)>,
 }
 
 /// What of a point is written into shaders' text.
@@ -165,17 +165,17 @@ impl GpuEngine {
         self.device.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn written(&self, point: &Point) -> Written {
+    fn written(&self, point: &Point) -> Specialization {
         let turns = |u: &Unknown| matches!(u, Unknown::Param(c) if c.param == Param::EnvironmentRotation);
         let gains = |u: &Unknown| matches!(u, Unknown::Gain(..));
-        Written {
+        Specialization {
             turned: point.params.scalar(Param::EnvironmentRotation) != 0.0 || self.unknowns.iter().any(turns),
             gained: point.gains.iter().any(|gain| *gain != Gain::ONE) || self.unknowns.iter().any(gains),
         }
     }
 
     /// What is the same for every view, over samples.
-    fn fitted(&self, written: Written, faces: FaceSizes) -> Fitted {
+    fn fitted(&self, written: Specialization, faces: FaceSizes) -> Fitted {
         Fitted {
             setup: self.setup,
             output: None,
@@ -185,15 +185,20 @@ impl GpuEngine {
             turned: written.turned,
             gained: written.gained,
             faces,
-            layout: Layout::of_samples(&self.traits.places, self.traits.rows)
+            layout: Layout::of_samples(&self.format.places, self.format.rows)
                 .with_levels(self.looked_up[usize::from(written.turned)].clone()),
-            several: self.traits.several,
-            weighted: self.traits.weighted,
-            clipped: self.traits.clipped,
+            several: self.format.several,
+            weighted: self.format.weighted,
+            clipped: self.format.clipped,
         }
     }
 
-    fn fused(&self, written: Written, faces: FaceSizes, output: Option<TermName>) -> Result<Fused, GpuError> {
+    fn fused(
+        &self,
+        written: Specialization,
+        faces: FaceSizes,
+        output: Option<TermName>,
+    ) -> Result<Fused, GpuError> {
         let mut fitted = Fitted { output, ..self.fitted(written, faces) };
         if self.held.is_some() {
             fitted.layout = Layout::of_terms(self.setup, &fitted.layout);
@@ -238,7 +243,7 @@ impl GpuEngine {
     }
 
     /// One pass: for each part of each view its sums.
-    fn sums(&self, point: &Point, wish: PassOutputs) -> Result<Passed, GpuError> {
+    fn sums(&self, point: &Point, wish: PassOutputs) -> Result<PassSums, GpuError> {
         let written = self.written(point);
         let mut device = self.lock();
         self.keep(point, &mut device)?;
@@ -253,6 +258,6 @@ impl GpuEngine {
         };
         lights.set(&self.gpu, &point.params, &mut program.inputs)?;
         let sums = program.run(&self.gpu, parts, &self.views, &point.gains)?;
-        Ok(Passed { sums, columns: program.columns().to_vec(), view_of: parts.views() })
+        Ok(PassSums { sums, columns: program.columns().to_vec(), view_of: parts.views() })
     }
 }

@@ -18,7 +18,7 @@ impl Objective for GpuEngine {
     }
 
     fn is_quadratic(&self) -> bool {
-        self.loss == Loss::L2 && !self.traits.clipped
+        self.loss == Loss::L2 && !self.format.clipped
     }
 
     fn rounding(&self) -> f64 {

@@ -17,7 +17,7 @@ use skinfit_core::engine::view::ObservedView;
 
 /// What is the same for all views.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Traits {
+pub(super) struct ViewFormat {
     /// Where a sample's numbers stand, and how many rows a record has.
     pub(super) places: Places,
     pub(super) rows: usize,
@@ -33,11 +33,11 @@ pub(super) struct Traits {
     pub(super) levels: usize,
 }
 
-impl Traits {
+impl ViewFormat {
     pub(super) fn of(gpu: &Gpu, views: &[ObservedView]) -> Result<Self, GpuError> {
         let single = |view: &ObservedView| view.samples.records() == view.samples.groups();
         let first = views.first();
-        let traits = Self {
+        let format = Self {
             places: first.map(|view| *view.samples.surface.places()).unwrap_or_default(),
             rows: first.map_or(0, |view| view.samples.surface.rows().stride()),
             channels: first.map_or(0, |view| view.target.stride()),
@@ -47,10 +47,10 @@ impl Traits {
             levels: 0,
         };
         let alike = |view: &ObservedView| {
-            *view.samples.surface.places() == traits.places && view.target.stride() == traits.channels
+            *view.samples.surface.places() == format.places && view.target.stride() == format.channels
         };
         if views.iter().all(alike) {
-            return Ok(traits);
+            return Ok(format);
         }
         Err(GpuError::Refused {
             adapter: gpu.name().to_owned(),
@@ -63,7 +63,7 @@ impl Traits {
 #[derive(Default)]
 pub(super) struct Parts {
     pub(super) parts: Vec<Part>,
-    traits: Traits,
+    format: ViewFormat,
     pub(super) stride: usize,
     /// Bytes that a part's samples may take, or their terms.
     limit: u64,
@@ -80,7 +80,7 @@ impl Parts {
     pub(super) fn new(
         gpu: &Gpu,
         views: &[ObservedView],
-        traits: &Traits,
+        format: &ViewFormat,
         memory: Memory,
         (made, levels): (Option<&DeviceSamples>, Option<&Buffer>),
     ) -> Result<Self, GpuError> {
@@ -89,7 +89,7 @@ impl Parts {
         let limit = memory.part.map_or(limit, |part| part.min(limit));
         let mut parts = Self {
             parts: Vec::new(),
-            traits: *traits,
+            format: *format,
             stride: 1,
             limit,
             memory,
@@ -104,7 +104,7 @@ impl Parts {
         }
         let (mut used, mut shared) = (0, None);
         for (index, view) in views.iter().enumerate() {
-            for groups in cut(view, traits.rows.max(traits.levels), limit) {
+            for groups in cut(view, format.rows.max(format.levels), limit) {
                 let size = parts.size(view, &groups);
                 let resident = memory.resident.is_none_or(|most| used + size.total() <= most);
                 let buffers = if resident {
@@ -193,7 +193,7 @@ impl Parts {
     pub(super) fn all_hold(&self, rows: usize, views: &[ObservedView]) -> bool {
         let bytes = |part: &Part| (4 * rows * Self::samples(part, views)) as u64;
         let room = |part: &Part| self.memory.resident.is_none() && bytes(part) <= self.limit;
-        self.parts.iter().all(|part| part.resident && (rows <= self.traits.rows || room(part)))
+        self.parts.iter().all(|part| part.resident && (rows <= self.format.rows || room(part)))
     }
 
     /// Upload every part's samples anew, or have them made anew, where their terms stand.
@@ -218,7 +218,7 @@ impl Parts {
 
     /// Whether samples look something up of the UV atlas.
     pub(super) const fn have_levels(&self) -> bool {
-        self.traits.levels > 0 || self.shared_levels.is_some()
+        self.format.levels > 0 || self.shared_levels.is_some()
     }
 
     /// Have what the samples of each view look up beside them.
@@ -237,7 +237,7 @@ impl Parts {
 
     fn upload_levels(&self, gpu: &Gpu, view: &ObservedView, part: &Part) {
         let (Some(buffer), Some(rows)) = (&part.buffers.levels, self.levels.get(part.view)) else { return };
-        write(gpu, buffer, (rows, self.traits.levels), &records(view, &part.groups));
+        write(gpu, buffer, (rows, self.format.levels), &records(view, &part.groups));
     }
 
     /// Upload a part that does not stay on the device.
@@ -253,10 +253,10 @@ impl Parts {
     fn size(&self, view: &ObservedView, groups: &Range<usize>) -> Size {
         let rows = |count: usize| (count * size_of::<Row>()) as u64;
         Size {
-            samples: rows(records(view, groups).len() * self.traits.rows),
+            samples: rows(records(view, groups).len() * self.format.rows),
             starts: (4 * (groups.len() + 1)) as u64,
-            targets: rows(groups.len() * (self.traits.channels + usize::from(self.traits.weighted))),
-            levels: rows(records(view, groups).len() * self.traits.levels),
+            targets: rows(groups.len() * (self.format.channels + usize::from(self.format.weighted))),
+            levels: rows(records(view, groups).len() * self.format.levels),
         }
     }
 
@@ -281,7 +281,7 @@ impl Parts {
         gpu.queue.write_buffer(group_start, 0, bytemuck::cast_slice(&starts));
         self.upload_levels(gpu, view, part);
         let observed = write(gpu, targets, (view.target.all(), view.target.stride()), &part.groups);
-        if self.traits.weighted {
+        if self.format.weighted {
             let ones;
             let weights = match view.weight.get(part.groups.clone()) {
                 Some(weights) => weights,

@@ -90,7 +90,7 @@ pub struct ColumnOf {
     /// The seed whose tangent it is.
     seed: Option<usize>,
     /// The channels that it moves.
-    channels: Moved,
+    channels: ChannelMask,
 }
 
 impl ColumnOf {
@@ -102,9 +102,9 @@ impl ColumnOf {
 
 /// Channels that a column moves, a bit each: three colours, and alpha where it is compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Moved(u8);
+struct ChannelMask(u8);
 
-impl Moved {
+impl ChannelMask {
     const RADIANCE: Self = Self(0b0111);
     const ALPHA: Self = Self(0b1000);
     const ALL: Self = Self(0b1111);
@@ -155,13 +155,14 @@ impl Fused {
         let (seeds, mut columns) = columns(&fitted.unknowns);
         let chain = Chain::new(&plan, &seeds).map_err(|error| error.to_string())?;
         for column in &mut columns {
-            let moved = column.seed.map_or(Moved::ALL, |seed| {
-                let radiance = if chain.radiance[seed].is_some() { Moved::RADIANCE } else { Moved::NONE };
-                radiance.or(if chain.haze[seed].is_some() { Moved::ALPHA } else { Moved::NONE })
+            let moved = column.seed.map_or(ChannelMask::ALL, |seed| {
+                let radiance =
+                    if chain.radiance[seed].is_some() { ChannelMask::RADIANCE } else { ChannelMask::NONE };
+                radiance.or(if chain.haze[seed].is_some() { ChannelMask::ALPHA } else { ChannelMask::NONE })
             });
             column.channels = column.channels.and(moved).and(compared(&fitted));
         }
-        columns.retain(|column| column.channels != Moved::NONE);
+        columns.retain(|column| column.channels != ChannelMask::NONE);
         plan.resources.extend(&chain.resources);
         plan.constants.extend(&chain.constants);
         Ok(Self { columns, fitted, chain, plan })
@@ -196,7 +197,7 @@ impl Fused {
     /// The sums of a wish; products of two columns that share no colour channel are 0 and left out.
     fn sums(&self, wish: PassOutputs) -> Vec<Sum> {
         let k = self.columns.len();
-        let meet = |i: usize, j: usize| self.moved(i).and(self.moved(j)) != Moved::NONE;
+        let meet = |i: usize, j: usize| self.moved(i).and(self.moved(j)) != ChannelMask::NONE;
         let mut sums = vec![Sum::Loss];
         if wish == PassOutputs::Normal {
             for i in 0..k {
@@ -210,7 +211,7 @@ impl Fused {
     }
 
     /// The channels that a column moves; the residual, after the last column, has all that are compared.
-    fn moved(&self, i: usize) -> Moved {
+    fn moved(&self, i: usize) -> ChannelMask {
         self.columns.get(i).map_or_else(|| compared(&self.fitted), |column| column.channels)
     }
 
@@ -221,8 +222,8 @@ impl Fused {
     }
 }
 
-const fn compared(fitted: &Fitted) -> Moved {
-    if fitted.alpha { Moved::ALL } else { Moved::RADIANCE }
+const fn compared(fitted: &Fitted) -> ChannelMask {
+    if fitted.alpha { ChannelMask::ALL } else { ChannelMask::RADIANCE }
 }
 
 /// What the planner is told of stored samples.
@@ -244,8 +245,8 @@ fn columns(unknowns: &[Unknown]) -> (Vec<Seed>, Vec<ColumnOf>) {
             params.len() - 1
         });
         let channels = match column.channels {
-            Channels::Tied => Moved::ALL,
-            Channels::One(c) => Moved(1 << c),
+            Channels::Tied => ChannelMask::ALL,
+            Channels::One(c) => ChannelMask(1 << c),
         };
         columns.push(ColumnOf { unknown: Some(index), seed: Some(seed), channels });
     }
@@ -254,8 +255,8 @@ fn columns(unknowns: &[Unknown]) -> (Vec<Seed>, Vec<ColumnOf>) {
     let gained = unknowns.iter().any(|unknown| matches!(unknown, Unknown::Gain(..)));
     let gains = match (gained, by_channel) {
         (false, _) => vec![],
-        (true, false) => vec![Moved::ALL],
-        (true, true) => (0..4).map(|c| Moved(1 << c)).collect(),
+        (true, false) => vec![ChannelMask::ALL],
+        (true, true) => (0..4).map(|c| ChannelMask(1 << c)).collect(),
     };
     columns.extend(gains.into_iter().map(|channels| ColumnOf { unknown: None, seed: None, channels }));
     (params.into_iter().map(Seed::of_param).collect(), columns)

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::reduce::{functions, reduction};
-use super::{ColumnOf, Fused, Moved, Sum, WORKGROUP};
+use super::{ChannelMask, ColumnOf, Fused, Sum, WORKGROUP};
 use crate::shader::Domain;
 use crate::shader::atlas::stored;
 use crate::shader::emit::{shown, with_haze};
@@ -174,7 +174,7 @@ impl Fused {
                 // A column of one channel is a number.
                 Some(_) if i < self.columns.len() && self.moved(i).only().is_some() => name,
                 Some(c) => format!("{name}[{c}]"),
-                None if both == Moved::RADIANCE => format!("{name}.xyz"),
+                None if both == ChannelMask::RADIANCE => format!("{name}.xyz"),
                 None => name,
             }
         };
