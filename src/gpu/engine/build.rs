@@ -9,7 +9,7 @@ use super::fused::{Layout, held_parameters};
 use super::levels::DeviceLevels;
 use super::lights::DeviceLights;
 use super::parts::{Parts, ViewFormat};
-use super::{DeviceSamples, GpuEngine, Memory, OnDevice, Written};
+use super::{DeviceSamples, GpuEngine, Memory, OnDevice, Specialization};
 use crate::model::terms::TermName;
 use crate::{Gpu, GpuError};
 use skinfit_core::engine::view::ObservedView;

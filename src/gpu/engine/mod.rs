@@ -106,7 +106,7 @@ struct OnDevice {
 
 /// What of a point is written into shaders' text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Written {
+struct Specialization {
     /// Whether the environment is turned, or will be.
     turned: bool,
     /// Whether a view's gain is not 1, or will not be.
