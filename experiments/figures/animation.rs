@@ -42,7 +42,7 @@ fn occlusion(lab: &Lab) -> Result<Value> {
     let (fine, fine_seconds) = clip.baked(&scene, OCCLUSION)?;
     let fine = of_each(&clip, &fine)?;
     let drawn_anew = drawn_anew(&clip, rays);
-    // Seconds of so many bakes, by the frame.
+    // Seconds of `count` bakes, by the frame.
     let of_poses = |count: usize| seconds * count as f64 / clip.poses.len() as f64;
     let way = |name: &str, rate, seconds, frames| Way { name: name.to_owned(), rate, seconds, frames };
     let mut ways = vec![way("each frame", Some(FPS), Some(of_poses(clip.poses.len())), each.clone())];

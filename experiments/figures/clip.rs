@@ -109,7 +109,7 @@ impl Clip {
         Ok((bakes, seconds / self.poses.len() as f64))
     }
 
-    /// How many poses are baked at so many a second.
+    /// How many poses are baked at `rate` a second.
     pub(crate) fn baked_at(&self, rate: usize) -> usize {
         (self.poses.len() - 1).div_ceil(FPS / rate) + 1
     }

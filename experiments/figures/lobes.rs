@@ -13,11 +13,11 @@ use skinfit::prepare::{Loaded, PrepareOptions};
 use crate::lab::Result;
 use crate::unchanged::{Planes, planes};
 
-/// Of so many texels one is compared: a prime, so that all columns and rows have their turn.
+/// Of this number of texels one is compared: a prime, so that all columns and rows have their turn.
 const EVERY: usize = 211;
 /// Texels along the face of the panorama's cube, as both programs filter it.
 const SOURCE: usize = 256;
-/// Each of its texels is split so many times along both sides: cells of 0.18 degrees, a seventh of the sharpest lobe's deviation.
+/// Cells along either side of each of its texels: of 0.18 degrees, a seventh of the sharpest lobe's deviation.
 const SPLITS: usize = 2;
 
 /// For each program how far the lobes that it baked lie from brute force, as shares of a lobe's mean: the root of the mean
@@ -46,7 +46,7 @@ pub(crate) fn beside_brute_force([then, now]: &[PathBuf; 2], scene: &Path) -> Re
     Ok(json!({ "before": before.told(), "now": after.told() }))
 }
 
-/// The lobe along each texel that is compared, of a cube that has so many.
+/// The lobe along each texel that is compared, of a cube of `texels` texels.
 fn exact(source: &Cube<f64>, exponent: f64, texels: usize) -> Vec<(usize, [f64; 4])> {
     let size = (texels / 6).isqrt();
     let compared: Vec<usize> = (0..texels).step_by(EVERY).collect();

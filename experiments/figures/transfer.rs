@@ -30,7 +30,7 @@ pub(crate) fn measure(lab: &Lab) -> Result<Value> {
     let seen = Seen { scene: &scene, clip: &clip, rays, field };
     let (bakes, seconds) = clip.baked(&scene, TRANSFER)?;
     let each = seen.frames(|frame| seen.by(frame, bakes[frame].sky.as_ref()))?;
-    // Seconds of so many bakes, by the frame.
+    // Seconds of `count` bakes, by the frame.
     let of_poses = |count: usize| seconds * count as f64 / clip.poses.len() as f64;
     let row = |name: &str, rate: Option<usize>, seconds: f64, frames: &[Vec<f32>]| {
         let error = Apart::between(frames, &each).json();

@@ -138,7 +138,7 @@ impl Gpu {
         Ok(made)
     }
 
-    /// A buffer of so many bytes for shaders to write and read; they are 0 at first.
+    /// A buffer of `bytes` bytes for shaders to write and read; they are 0 at first.
     ///
     /// # Errors
     /// When it is larger than a binding may be, or the device has no room for it.

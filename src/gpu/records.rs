@@ -12,7 +12,7 @@ use crate::samples::rows::Row;
 /// Numbers of a lane that stand together.
 const QUAD: usize = 4;
 
-/// Records of so many rows on an adapter, in a buffer of f32 that shaders know by a name. Where they read it four numbers
+/// Records of `rows` rows on an adapter, in a buffer of f32 that shaders know by a name. Where they read it four numbers
 /// at a time, it is bound a second time, as `<name>_quads`.
 #[derive(Clone, Copy, Debug)]
 pub struct StoredRecords {

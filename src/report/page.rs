@@ -93,7 +93,7 @@ impl Cell {
         Self { html: html.into(), sort: value.is_finite().then_some(value) }
     }
 
-    /// A score with so many digits, where it is known.
+    /// A score with `digits` decimals, where it is known.
     #[must_use]
     pub fn score(score: Option<f64>, digits: usize) -> Self {
         score.map_or_else(Self::none, |x| Self::value(format!("{x:.digits$}"), x))

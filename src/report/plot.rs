@@ -254,7 +254,7 @@ impl Plot<'_> {
     }
 }
 
-/// A place for a label of so many letters beside (x, y) that covers no label before it and, if there is one, none of
+/// A place for a label of `letters` letters beside (x, y) that covers no label before it and, if there is one, none of
 /// the `marks`; none if there is no such place.
 fn place(
     written: &mut Vec<(f64, f64, f64)>,

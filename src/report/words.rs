@@ -59,7 +59,7 @@ pub fn seconds(s: f64) -> String {
     }
 }
 
-/// A count with thin spaces between thousands, or `one` thing and so many `many`.
+/// A count with thin spaces between thousands.
 #[must_use]
 pub fn count(n: u64) -> String {
     let digits = n.to_string();

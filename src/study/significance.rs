@@ -13,7 +13,7 @@ use serde::Serialize;
 
 /// The fewest blocks whose spread tells a standard error to within about an eighth.
 const LEAST_BLOCKS: usize = 30;
-/// A change beyond so many standard errors is called significant: chance alone goes there once in 370 times.
+/// A change beyond this number of standard errors is called significant: chance alone goes there once in 370 times.
 pub const SIGNIFICANT: f64 = 3.0;
 
 /// A view's losses, pixel by pixel.
@@ -123,7 +123,7 @@ mod tests {
         LossMap { width: 128, weight: vec![1.0; loss.len()], loss }
     }
 
-    /// Differences that are the same within squares of so many pixels, and drawn anew for each.
+    /// Differences that are the same within squares of `side` pixels a side, and drawn anew for each.
     fn patches(side: usize, mean: f64, seed: u64) -> LossMap {
         let mut rng = rand::rngs::StdRng::seed_from_u64(seed);
         let across = 128 / side;

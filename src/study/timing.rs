@@ -62,7 +62,7 @@ pub struct Rounds {
     pub least: usize,
     /// Rounds at most.
     pub most: usize,
-    /// Between the two, rounds go on until so many seconds have passed.
+    /// Between the two, rounds go on until this number of seconds has passed.
     pub seconds: f64,
 }
 

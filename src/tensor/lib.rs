@@ -83,7 +83,7 @@ pub enum TensorError {
     Model(#[from] AdjointError),
 }
 
-/// What a backward pass leaves when it cannot be done: zeros in the place of a gradient of so many rows, and the
+/// What a backward pass leaves when it cannot be done: zeros in the place of a gradient of that shape, and the
 /// reason for [`Gpu::check`] to tell, as burn's backward passes return nothing.
 fn or_zeros(
     gpu: &Gpu,

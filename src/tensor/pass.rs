@@ -74,7 +74,7 @@ fn workgroups(threads: u64) -> [u32; 2] {
     [count.div_ceil(rows) as u32, rows as u32]
 }
 
-/// How many workgroups a dispatch of so many threads has.
+/// How many workgroups a dispatch of `threads` threads has.
 pub(super) fn workgroup_count(threads: u64) -> u64 {
     let [x, y] = workgroups(threads);
     u64::from(x) * u64::from(y)

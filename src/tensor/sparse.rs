@@ -19,7 +19,7 @@ use super::buffer::{check_shape, lend, plain, tracked};
 use super::{SharedDevice, TensorError, pass};
 use crate::gpu::Gpu;
 
-/// A sparse matrix on the device, of so many rows and columns; it is cheap to clone.
+/// A sparse matrix on the device; it is cheap to clone.
 #[derive(Clone, Debug)]
 pub struct Sparse(Arc<Matrix>);
 

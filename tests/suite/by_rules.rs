@@ -240,7 +240,7 @@ fn texts_of_rule(effects: Effects, name: &str) -> Vec<&'static str> {
 pub(crate) struct Function(Steps);
 
 impl Function {
-    /// The function of that name in some texts, whose arguments have so many components.
+    /// The function `name` of some texts, with the number of components of each of its arguments.
     pub(crate) fn new(texts: &[&str], name: &str, arguments: &[usize]) -> Self {
         let source = lower::Source::new(&texts.concat(), Natives::Written).unwrap();
         let mut graph = Graph::default();

@@ -20,7 +20,7 @@ fn param(name: &str) -> Param {
     Param::from_name(name).unwrap()
 }
 
-/// The built-in head with a lamp, in so many pixels a side, its light map of 128 texels; three blurs or five.
+/// The built-in head with a lamp, in `pixels` pixels a side, its light map of 128 texels; three blurs or five.
 fn head(combined: Combined, unblurred: Unblurred, five: bool, pixels: u32) -> Baked {
     let mut more = vec![Effect::NormalMap, Effect::Lights, effect("fresnel"), effect("diffusion")];
     more.extend(five.then(|| effect("diffusion_five")));

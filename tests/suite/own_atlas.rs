@@ -28,7 +28,7 @@ fn waves(number: impl Fn([f32; 2]) -> [f32; 3]) -> Map<3> {
     Map { width: 64, height: 64, texels }
 }
 
-/// The built-in head with a lamp in so many pixels a side: blurs some texels wide, half of the colour before them.
+/// The built-in head with a lamp in `pixels` pixels a side: blurs some texels wide, half of the colour before them.
 fn head(pixels: u32, change: impl FnOnce(&mut Scene)) -> Baked {
     head_changed(&[Effect::NormalMap, Effect::Lights, effect("diffusion")], |scene| {
         scene.diffusion.light_map_size = 96;

@@ -39,8 +39,8 @@ fn apart(baked: &Baked, a: &Camera, b: &Camera) -> [f64; 2] {
     [pixels[pixels.len() / 2], pixels[pixels.len() - 1]]
 }
 
-/// The camera moved: so many pixels to the right and down at the mesh, turned about the mesh by degrees, and its tangent
-/// of half the field of view multiplied.
+/// The camera moved: `right` pixels to the right and `down` down at the mesh, turned about the mesh by degrees, and its
+/// tangent of half the field of view multiplied.
 fn displaced(
     camera: &Camera,
     middle: DVec3,

@@ -62,7 +62,7 @@ fn moved(camera: &mut Camera, motion: DMat4, place: DVec3) -> [f64; 2] {
     [before.0 - after.0, before.1 - after.1]
 }
 
-/// A target is said to lie elsewhere by so many pixels to the right and down, but for some.
+/// A target is said to lie elsewhere by `pixels` to the right and down, give or take `some`.
 fn check_told(text: &str, pixels: [f64; 2], some: f64) {
     let (_, told) = text.split_once("the target's lies ").unwrap_or_else(|| panic!("{text}"));
     let words: Vec<&str> = told.split([' ', ',', ';']).collect();

@@ -36,7 +36,7 @@ fn bowl(opening: f64) -> PosedMesh {
     mesh
 }
 
-/// Two floors, one above the other, of so many vertices a side; the upper at `height`, looking down.
+/// Two floors, one above the other, of `side` vertices a side; the upper at `height`, looking down.
 fn floors(side: u32, height: f32) -> PosedMesh {
     let mut mesh = PosedMesh::default();
     for (y, normal) in [(0.0, Vec3::Y), (height, Vec3::NEG_Y)] {

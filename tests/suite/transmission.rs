@@ -145,7 +145,7 @@ fn light_comes_through_as_the_vectors_say_in_every_kind_of_number() {
     }
     root.at("name").assert_text("transmission");
     root.at("kind").assert_text("transmission");
-    // Beyond so many lengths nothing is left: the longest that a parameter may be is what samples hold of no end.
+    // Beyond `OPTICAL_MAX` lengths nothing is left: the longest that a parameter may be is what samples hold of no end.
     let lengths = root.at("constants").at("OPTICAL_MAX").number();
     assert_eq!(lengths * param("transmission_length").info().upper, FARTHEST);
     let unread: Vec<_> = root.vector.left().into_iter().filter(|path| *path != "note").collect();
@@ -347,7 +347,7 @@ fn nothing_is_baked_that_is_not_asked_for() {
     assert!(wanted.iter().all(|name| fields.contains(name)), "{fields:?}");
 }
 
-/// The built-in head, so small that light comes through it, in so many pixels a side.
+/// The built-in head, so small that light comes through it, in `pixels` pixels a side.
 fn head(pixels: u32) -> Baked {
     let more = [Effect::NormalMap, Effect::Lights, Effect::Shadows, effect("transmission")];
     head_with(&more).with_scene(|scene| {

@@ -17,7 +17,7 @@ fn param(name: &str) -> Param {
     Param::from_name(name).unwrap()
 }
 
-/// The built-in head with a lamp, in so many pixels a side, its light map of 128 texels.
+/// The built-in head with a lamp, in `pixels` pixels a side, its light map of 128 texels.
 fn head(unblurred: Unblurred, pixels: u32) -> Baked {
     let more = [Effect::NormalMap, Effect::Lights, Effect::Shadows, effect("fresnel"), effect("diffusion")];
     head_with(&more).with_scene(|scene| {

@@ -8,7 +8,7 @@ use super::harmonics::{CONSTANT, Order, open_transfer, scale, unscaled};
 use crate::scene::maps::{Environment, Map};
 
 /// Nodes of the Gauss-Legendre rule over a row of a panorama: what is integrated is a sum of sines of up to 6 times the
-/// polar angle, of which so many nodes leave 1e-13 were one row the whole sphere.
+/// polar angle, of which these nodes leave 1e-13 were one row the whole sphere.
 const NODES: usize = 16;
 
 /// Coefficients of the light around, rgb, in the world's orientation.

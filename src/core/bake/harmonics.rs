@@ -24,7 +24,7 @@ impl Order {
     /// The highest order.
     pub const MOST: Self = Self(6);
 
-    /// The order of so many bands, where there is one.
+    /// The order of `bands` bands, where there is one.
     #[must_use]
     pub fn new(bands: usize) -> Option<Self> {
         (Self::LEAST.0..=Self::MOST.0).contains(&bands).then_some(Self(bands))

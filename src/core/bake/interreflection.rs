@@ -113,7 +113,7 @@ impl std::fmt::Debug for VertexGather {
 }
 
 impl VertexGather {
-    /// Of a mesh as it is posed, by so many rays a vertex. All cores.
+    /// Of a mesh as it is posed, by `rays` rays a vertex. All cores.
     #[must_use]
     pub fn new(mesh: &PosedMesh, rays: u32, albedo: &Albedo<'_>) -> Self {
         let vertices = VertexRays::new(&|_| mesh.clone(), 0, rays);

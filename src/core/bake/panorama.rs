@@ -126,14 +126,14 @@ impl<'a> Radiance<'a> {
         Self::of(map, environment, environment.rotation_degrees)
     }
 
-    /// As [`Self::new`], turned by so many degrees about +Y instead of its own rotation.
+    /// As [`Self::new`], turned by `rotation_degrees` about +Y instead of its own rotation.
     #[must_use]
     pub fn turned(environment: &'a Environment, rotation_degrees: f64) -> Self {
         let turn = rotation_degrees.to_radians();
         Self { turn: (turn.cos(), turn.sin()), ..Self::new(environment) }
     }
 
-    /// The radiance of `environment` as fine as its file, turned by so many degrees about +Y instead of its own
+    /// The radiance of `environment` as fine as its file, turned by `rotation_degrees` about +Y instead of its own
     /// rotation: what a camera sees of it.
     #[must_use]
     pub fn whole(environment: &'a Environment, rotation_degrees: f64) -> Self {

@@ -155,7 +155,7 @@ mod tests {
         [Vec3::new(-1.0, -1.0, z), Vec3::new(1.0, -1.0, z), Vec3::new(0.0, 1.0, z)]
     }
 
-    /// `hidden`, so many times, and behind it a triangle across the z axis.
+    /// `hidden`, `count` times, and behind it a triangle across the z axis.
     fn before_the_last(hidden: [Vec3; 3], count: usize) -> (Vec<Vec3>, Vec<[u32; 3]>) {
         let positions = [hidden, across(2.0)].concat();
         let mut triangles = vec![[0, 1, 2]; count];
@@ -165,7 +165,7 @@ mod tests {
 
     #[test]
     fn a_part_that_posing_has_hidden_takes_no_time_and_what_is_left_keeps_its_number() {
-        // The builder would take hours for so many.
+        // The builder would take hours for them.
         const MANY: usize = 200_000;
         let point = Vec3::new(0.25, 0.5, 1.0);
         let grid = |k: u32| f32::from_bits(1.0_f32.to_bits() + k);

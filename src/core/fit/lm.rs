@@ -26,7 +26,7 @@ pub type LmState = IterState<Vec<f64>, Vec<f64>, (), (), (), f64>;
 const LOSS_ROUNDING: f64 = 1e-8;
 /// A promised gain below this share of the first loss that then does not come is rounding too.
 const GAIN_ROUNDING: f64 = 1e-9;
-/// After so many steps in a row within rounding, there is nothing more to gain.
+/// After this number of steps in a row within rounding, there is nothing more to gain.
 const MOST_IDLE: u32 = 3;
 /// An undamped step that promises more than this share of the loss is not put down to a rough loss.
 const ROUGH_OUTLOOK: f64 = 1e-3;
@@ -47,8 +47,8 @@ const NEAR: f64 = 0.9;
 /// Where elimination says that less than this share of a measured loss is left, that is a difference of sums
 /// that agree in all their digits: what is left must be measured.
 const LEFT: f64 = 1e-7;
-/// That matters where the measured loss was so many times the mean square of the image that is the answer: weights are
-/// then off by some 1e-6 of themselves, times the condition of the normal equations.
+/// That matters where the measured loss exceeded by this factor the mean square of the image that is the answer:
+/// weights are then off by some 1e-6 of themselves, times the condition of the normal equations.
 const EXTREME: f64 = 1e3;
 /// Linear unknowns that moved by more than this leave the Jacobian stale.
 const STALE: f64 = 0.01;

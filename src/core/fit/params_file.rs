@@ -193,7 +193,7 @@ impl ParamsFile {
     /// Read a file for a scene of `form`; what it does not name is as in `base`.
     ///
     /// # Errors
-    /// When it cannot be read, is no TOML, names what there is not, has values of the wrong kind or
+    /// When it cannot be read, is no TOML, names something unknown, has values of the wrong kind or
     /// outside their bounds, or is of another form.
     pub fn read(path: &Path, form: Form, base: &Params) -> Result<Self, ParamsFileError> {
         Self::parsed(path, Some((form, base)))

@@ -18,7 +18,7 @@ const STEPS: [f64; 5] = [1.0, 2.0, 4.0, 8.0, 16.0];
 const MOST_PASSES: u32 = 6;
 /// The others are solved for when what a step promises is this share of the rise that is looked for.
 const SETTLED: f64 = 0.01;
-/// An interval that is so many times as wide as its standard error says is a valley.
+/// An interval that is wider than its standard error says by this factor is a valley.
 const WIDE: f64 = 1.5;
 
 /// One place of a profile.
@@ -99,7 +99,7 @@ pub(super) fn weakest(coordinates: &Coordinates, answer: &Answer<'_>) -> Option<
     shares.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
 }
 
-/// The profile of unknown `i`; `stop` ends it early, with what there is. `None` where a pass fails.
+/// The profile of unknown `i`; `stop` ends it early, with the points found by then. `None` where a pass fails.
 pub(super) fn profile(
     passes: &Passes<'_>,
     answer: &Answer<'_>,

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 /// Passes that are looked back on.
 const PASSES: usize = 8;
-/// So many steps of them have been taken, and so many turned back.
+/// The fewest of their steps that were taken, and the fewest that were turned back.
 const LEAST: usize = 3;
 
 /// The least loss after each of the last passes, and whether its step was taken; before them, that at their start.

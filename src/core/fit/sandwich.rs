@@ -71,7 +71,7 @@ pub(super) fn sandwich(
     finite.then_some((covariance, Blocks { alike, side: tiles * TILE, count, next }))
 }
 
-/// J'Wr over squares of so many tiles a side.
+/// J'Wr over squares of `tiles` tiles a side.
 fn summed(pulls: &Pulls, tiles: usize) -> Vec<Vec<f64>> {
     let mut sums: BTreeMap<(usize, u32, u32), Vec<f64>> = BTreeMap::new();
     for tile in &pulls.tiles {
@@ -141,7 +141,7 @@ mod tests {
 
     const SIDE: usize = 256;
 
-    /// Residuals that are the same within squares of so many pixels, of variance 1.
+    /// Residuals that are the same within squares of `side` pixels a side, of variance 1.
     fn patches(side: usize, seed: u64) -> Vec<f32> {
         let mut rng = StdRng::seed_from_u64(seed);
         let across = SIDE.div_ceil(side);

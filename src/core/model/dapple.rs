@@ -21,8 +21,8 @@ impl Dapple {
     /// say where its light falls through leaves from.
     pub const LEAVES_AHEAD: Self = Self { axis: [0, 0, 1.0_f32.to_bits()], turns: false, in_world: true };
 
-    /// Of the third row of `DappleXf` in the environment's frame, which stands in the world turned about +Y by so many
-    /// degrees; `turns` where `environment_rotation` is free.
+    /// Of the third row of `DappleXf` in the environment's frame, which stands in the world turned about +Y by
+    /// `degrees`; `turns` where `environment_rotation` is free.
     #[must_use]
     pub fn new([x, y, z]: [f64; 3], degrees: f64, turns: bool) -> Self {
         let (sin, cos) = degrees.to_radians().sin_cos();
@@ -37,7 +37,7 @@ impl Dapple {
         self.axis.map(f32::from_bits)
     }
 
-    /// That direction, turned about +Y by so many degrees more.
+    /// That direction, turned about +Y by `degrees` more.
     #[must_use]
     pub fn turned(&self, degrees: f64) -> [f32; 3] {
         if self.in_world {

@@ -130,7 +130,7 @@ mod tests {
     use super::*;
     use crate::program::graph::Native;
 
-    /// How many numbers are kept of a fixed vector less the view, and so many `other` fields less, whose components and
+    /// How many numbers are kept of a fixed vector less the view and less `other` fields, whose components and
     /// square are needed beside a lookup along what the uniform `free` makes of the view: along a unit vector whose
     /// fallback is made of these fields, if `falls_back`.
     fn kept_of(other: usize, falls_back: bool) -> usize {

@@ -10,7 +10,7 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// Times that everything is moved down, then up; after so many nothing is won.
+/// Times that everything is moved down, then up; more gain nothing.
 const ROUNDS: usize = 5;
 
 /// Steps by the numbers that they read and write; every number has one step that writes it.

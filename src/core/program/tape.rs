@@ -72,8 +72,9 @@ pub enum Instruction {
     Select(Test, Slot, Slot, usize),
     /// A function.
     Call(Box<CallOf>),
-    /// A unit vector: as [`Instruction::Call`]. Where every sample has one, so many instructions are left out: they
-    /// make what stands in, and a [`Mend`] is the last of them. Else the register tells which have.
+    /// A unit vector: as [`Instruction::Call`]. Where every sample has one, the instructions after it are skipped, as
+    /// many as the last number says: they make what stands in, and a [`Mend`] is the last of them. Else the register
+    /// tells which have.
     Unit(Box<CallOf>, usize, usize),
     /// Put what stands in where it is needed.
     Mend(Box<Mend>),

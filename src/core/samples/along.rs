@@ -1,4 +1,5 @@
-//! Covered texels along an axis of the atlas: which stand so many steps from one, as blurs ask for millions of times.
+//! Covered texels along an axis of the atlas: which stand a number of steps from one, as blurs ask for millions of
+//! times.
 
 use super::LANES;
 use super::atlas::Atlas;
@@ -49,7 +50,7 @@ impl<'a> Along<'a> {
         &self.known[first / LANES]
     }
 
-    /// Whether sixteen texels have more than so many steps of their charts on either side; of steps backwards, no.
+    /// Whether sixteen texels have more than `steps` texels of their charts on either side; of steps backwards, no.
     #[inline(always)]
     #[must_use]
     pub fn have_room(&self, of: &SixteenTexels, steps: &[i32; LANES]) -> bool {
@@ -60,7 +61,7 @@ impl<'a> Along<'a> {
         0 <= least && most < of.room[self.axis as usize]
     }
 
-    /// The texels so many `steps` and `more` from sixteen, no further than these [have room](Self::have_room).
+    /// The texels `steps` and `more` from sixteen, no further than these [have room](Self::have_room).
     #[inline(always)]
     #[must_use]
     pub fn within(&self, of: &SixteenTexels, steps: &[i32; LANES], more: i32) -> [u32; LANES] {
@@ -86,7 +87,7 @@ impl<'a> Along<'a> {
         to
     }
 
-    /// The texels of the same charts, or of their margins, so many `steps` and `more` from sixteen, and 1 of those that there
+    /// The texels of the same charts, or of their margins, `steps` and `more` from sixteen, and 1 of those that there
     /// are, as [`Atlas::place_of_chart`] has it; in the place of what is not there the texels themselves, and 0. Without
     /// margins there are no branches, which near borders could not be foretold.
     #[inline(always)]
@@ -127,7 +128,7 @@ impl<'a> Along<'a> {
         [near, found]
     }
 
-    /// The texel so many steps from a covered one, of its chart or of that one's margin.
+    /// The texel `step` steps from a covered one, of its chart or of that one's margin.
     #[inline(always)]
     #[must_use]
     pub fn place(&self, place: u32, step: i32) -> Option<u32> {
@@ -136,14 +137,14 @@ impl<'a> Along<'a> {
         if chart == own { Some(near) } else { self.of_margin(place, step) }
     }
 
-    /// The texel of the chart's [margin](Atlas::margins) so many steps from a covered one, if there is one.
+    /// The texel of the chart's [margin](Atlas::margins) `step` steps from a covered one, if there is one.
     fn of_margin(&self, place: u32, step: i32) -> Option<u32> {
         let texel = self.texel(place, step)?;
         let number = self.atlas.margins().number(self.atlas.chart(place as usize), texel)?;
         Some(number as u32)
     }
 
-    /// The texel so many steps from a covered one, whatever it is of; `None` beyond the atlas.
+    /// The texel `step` steps from a covered one, whatever it is of; `None` beyond the atlas.
     #[inline(always)]
     fn texel(&self, place: u32, step: i32) -> Option<u32> {
         let at = self.atlas.texel(place as usize)[self.axis as usize];
@@ -188,7 +189,8 @@ fn room(along: &Along<'_>) -> Vec<u8> {
 mod tests {
     use super::*;
 
-    /// Charts of an odd size: two that touch, one with a hole, one of a single texel; so many of the texels are covered.
+    /// Charts of an odd size: two that touch, one with a hole, one of a single texel; `covered` of the texels are
+    /// covered.
     fn atlas(covered: usize) -> Atlas {
         const SIZE: usize = 9;
         let chart = |texel: usize| match (texel % SIZE, texel / SIZE) {

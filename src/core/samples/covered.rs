@@ -20,7 +20,7 @@ pub struct SampleMask {
 }
 
 impl SampleMask {
-    /// Of so many samples across and down; none is set.
+    /// A mask of `width` by `height` samples; none is set.
     #[must_use]
     pub fn new(width: u32, height: u32) -> Self {
         let stride = width.div_ceil(u32::BITS) as usize;

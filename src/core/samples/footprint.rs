@@ -197,13 +197,13 @@ mod tests {
         assert_eq!(unbounded.below, Vec2::new(-65536.0, 0.0));
     }
 
-    /// Of so many texels; each by its column and row.
+    /// A map of `size` texels a side; each by its column and row.
     fn map(size: usize, texel: impl Fn(usize, usize) -> f32) -> Maps {
         let texels = (0..size * size).map(|i| [texel(i % size, i / size)]).collect();
         Maps { specular: Some(Map { width: size, height: size, texels }), ..Maps::default() }
     }
 
-    /// A map of a side of 64 texels over a footprint of so many.
+    /// A map of 64 texels a side over a footprint in texels.
     fn read(maps: &Maps, filter: TextureFilter, uv: [f32; 2], [right, below]: [[f64; 2]; 2]) -> f32 {
         let mip_maps = MipMaps::new(maps, filter).unwrap();
         let texels = |[u, v]: [f64; 2]| [u / 64.0, v / 64.0];

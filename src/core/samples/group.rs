@@ -13,7 +13,8 @@ const CHUNK: usize = 64;
 /// The pixels that show the mesh, row by row: each one's index in the image, and where its hits start and end.
 pub(super) type Pixels = [(u32, std::ops::Range<u32>)];
 
-/// Pack the hits of a view of `width` pixels with `per_pixel` samples a pixel; `done` is told of so many more pixels.
+/// Pack the hits of a view of `width` pixels with `per_pixel` samples a pixel; `done` is told how many more pixels are
+/// packed.
 pub(super) fn pack(
     hits: &Hits,
     surface: &Surface<'_>,

@@ -298,7 +298,7 @@ pub fn check_uvs(scene: &Scene, uvs: &[Vec2]) -> Result<(), SampleError> {
     Ok(())
 }
 
-/// The occlusion of each of so many vertices of a scene's mesh, with `morphs` at their weights.
+/// The occlusion of each of `vertices` vertices of a scene's mesh, with `morphs` at their weights.
 ///
 /// # Errors
 /// When it was baked for another mesh.
@@ -339,7 +339,7 @@ pub fn sample_view(scene: &Scene, posed: &PosedSurface<'_>, camera: &Camera) -> 
     sampled(scene, posed, camera, |_| {})
 }
 
-/// As [`sample_view`]; `done` is told of so many more pixels that are covered.
+/// As [`sample_view`]; `done` is told how many more covered pixels are sampled.
 fn sampled(
     scene: &Scene,
     posed: &PosedSurface<'_>,

@@ -63,9 +63,9 @@ enum Shown {
     Plain(Hit),
 }
 
-/// Behind so many layers that blend only what is opaque is seen.
+/// Behind this number of layers that blend only what is opaque is seen.
 const MOST_LAYERS: usize = 16;
-/// And behind so many triangles, those with holes there among them.
+/// And behind this number of triangles, those with holes there among them.
 const MOST_HOLES: usize = 256;
 
 /// A triangle as seen from the eye: rays from there hit it by three dot products.

@@ -8,7 +8,7 @@ use super::error::SceneError;
 use super::file::Source;
 use crate::model::dapple::Dapple;
 
-/// The dapple of a scene whose environment is turned by so many degrees about +Y. Without a matrix it is the identity in
+/// The dapple of a scene whose environment is turned by `degrees` about +Y. Without a matrix it is the identity in
 /// the world: scenes that do not say where light falls through leaves from look the same however they are turned.
 pub(super) fn dapple(
     source: &Source,

@@ -182,7 +182,7 @@ impl Light {
         }
     }
 
-    /// The light turned by so many degrees about +Y, by the right-hand rule.
+    /// The light turned by `degrees` about +Y, by the right-hand rule.
     #[must_use]
     pub fn turned(&self, degrees: f64) -> Self {
         let turn = DQuat::from_rotation_y(degrees.to_radians());

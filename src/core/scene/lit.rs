@@ -162,7 +162,7 @@ impl Lights {
 }
 
 impl Scene {
-    /// The same scene with so many of its panorama's brightest spots as lights; fewer, where it has no more.
+    /// The same scene with `count` of its panorama's brightest spots as lights; fewer, where it has no more.
     ///
     /// # Errors
     /// When a file of rules has taken the name of one.

@@ -11,7 +11,7 @@ pub fn short(number: f64) -> String {
     text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
 }
 
-/// A number to so many digits, as one would write it.
+/// A number to `digits` digits, as one would write it.
 #[must_use]
 pub fn digits(x: f64, digits: i32) -> String {
     // Without a sign.

@@ -108,9 +108,9 @@ pub struct Blur {
 /// What a pass does with the texels around one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kernel {
-    /// A blur of so many places, an odd number. Of the quantities that it needs at the texel, `axis`, and `tap`, from
-    /// -(taps - 1) / 2 to (taps - 1) / 2 in whole steps (`f32`), the function makes how many texels away the place is, and
-    /// what it weighs (`vec2f`).
+    /// A blur of this number of taps, an odd one. Of the quantities that it needs at the texel, `axis`, and `tap`,
+    /// from -(taps - 1) / 2 to (taps - 1) / 2 in whole steps (`f32`), the function makes how many texels away the place
+    /// is, and what it weighs (`vec2f`).
     Taps(u32),
     /// A blur by a Gaussian, with as many taps as the scene chooses. The function makes its standard deviation along
     /// `axis`, in texels.

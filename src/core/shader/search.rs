@@ -23,7 +23,7 @@ use super::term;
 use crate::model::effects::{Effect, Effects};
 use crate::model::fields::Field;
 
-/// Costs and errors in the search are whole numbers: so many to one.
+/// Costs and errors in the search are whole numbers of steps: how many make one.
 const COST_STEPS: f64 = 16.0;
 const ERROR_STEPS: f64 = 1e9;
 

@@ -9,7 +9,7 @@ use crate::program::steps::{Rounding, Steps};
 pub(super) struct Function(Steps);
 
 impl Function {
-    /// A function of a text that takes so many numbers.
+    /// The function `name` of a text, which takes `count` numbers.
     pub(super) fn new(text: &str, name: &str, count: usize) -> Self {
         let source = Source::new(text, Natives::Written).unwrap();
         let mut graph = Graph::default();

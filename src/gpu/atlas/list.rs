@@ -32,7 +32,7 @@ impl Texels {
     /// Of a mesh that is laid out by these texture coordinates.
     ///
     /// # Errors
-    /// When light cannot stand in such an atlas, or the adapter takes no list of so many.
+    /// When light cannot stand in such an atlas, or the adapter takes no list as long.
     pub(super) fn new(gpu: &Gpu, uvs: &[Vec2], triangles: &[[u32; 3]], size: u32) -> Result<Self, GpuError> {
         let covered = listed(uvs, triangles, size).map_err(|error| GpuError::Plan(error.to_string()))?;
         let words = |texel: &Listed| {

@@ -13,7 +13,7 @@ use skinfit_core::engine::view::ObservedView;
 /// Records that are packed at once: 3 to 21 MB.
 const PACKED_RECORDS: usize = 1 << 14;
 
-/// Ranges of groups, whole blocks each, whose records of so many rows stay within the limit. A block that is beyond
+/// Ranges of groups, whole blocks each, whose records of `rows` rows stay within the limit. A block that is beyond
 /// it on its own is left to the adapter to refuse.
 pub(super) fn cut(view: &ObservedView, rows: usize, limit: u64) -> Vec<Range<usize>> {
     let groups = view.samples.groups();

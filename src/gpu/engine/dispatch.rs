@@ -17,7 +17,7 @@ const PIXELS_A_THREAD: usize = 4;
 /// processors half empty.
 const MOST_WORKGROUPS: usize = 1056;
 
-/// Workgroups for so many pixels, of which each thread shades a few.
+/// Workgroups for `pixels` pixels, of which each thread shades a few.
 fn tiles(pixels: usize, most: usize) -> u32 {
     pixels.div_ceil(WORKGROUP as usize * PIXELS_A_THREAD).clamp(1, most) as u32
 }

@@ -137,7 +137,7 @@ impl GpuEngine {
         self.gpu.wait()
     }
 
-    /// Milliseconds of each of so many forward passes over all views with nothing read back. On the GPU's clock, one
+    /// Milliseconds of each of `passes` forward passes over all views with nothing read back. On the GPU's clock, one
     /// right after another; a program on the CPU stamps a compute pass before its threads have run it, so there it is
     /// the host's clock, around each. Empty where a card has no timestamps.
     ///

@@ -188,7 +188,7 @@ impl Parts {
         total
     }
 
-    /// Whether every part stays on the device, and there is room for records of so many rows of each. Longer ones than
+    /// Whether every part stays on the device, and there is room for records of `rows` rows of each. Longer ones than
     /// the samples' stand beside these while they are made: not where memory is limited.
     pub(super) fn all_hold(&self, rows: usize, views: &[ObservedView]) -> bool {
         let bytes = |part: &Part| (4 * rows * Self::samples(part, views)) as u64;

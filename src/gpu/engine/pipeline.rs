@@ -37,7 +37,7 @@ impl Uniform {
     }
 }
 
-/// A buffer of so many bytes; of 16 at the least, as bindings may not be empty.
+/// A buffer of `bytes` bytes; of 16 at the least, as bindings may not be empty.
 pub(super) fn buffer(gpu: &Gpu, label: &str, bytes: usize, usage: BufferUsages) -> Buffer {
     gpu.device.create_buffer(&BufferDescriptor {
         label: Some(label),

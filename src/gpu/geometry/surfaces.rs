@@ -10,7 +10,7 @@ use crate::device::Gpu;
 use crate::error::{GpuError, Oversized};
 use crate::targets::{DEPTH, Tile};
 
-/// The formats of so many targets.
+/// The formats of `targets` targets.
 pub(super) fn formats(targets: usize) -> Vec<TextureFormat> {
     vec![TextureFormat::Rgba32Float; targets]
 }
@@ -60,7 +60,7 @@ impl Surfaces {
         Ok(made)
     }
 
-    /// A pass into the first so many targets, cleared.
+    /// A pass into the first `targets` targets, cleared.
     pub(super) fn begin<'e>(&self, encoder: &'e mut CommandEncoder, targets: usize) -> RenderPass<'e> {
         let ops = Operations { load: LoadOp::Clear(Color::TRANSPARENT), store: StoreOp::Store };
         let attachment =

@@ -83,7 +83,7 @@ pub trait Painter {
     /// # Errors
     /// When no rules yield the effects' image, or the device does not take what is read at them.
     fn set_params(&mut self, params: &Params) -> Result<(), PaintError>;
-    /// Shade so many samples along a pixel's side in the images to come, where an engine can do with fewer than the
+    /// Shade `per_axis` samples along a pixel's side in the images to come, where an engine can do with fewer than the
     /// scene's: the CPU engine keeps those that it has found.
     fn set_samples(&mut self, _per_axis: u32) {}
     /// The image that `camera` sees, times `gain`.

@@ -32,7 +32,7 @@ pub(crate) struct Casters {
 }
 
 impl Casters {
-    /// Of the scene that `uploads` are of, for so many layers; `None` where light passes nothing of its mesh.
+    /// Of the scene that `uploads` are of, for `layers` layers; `None` where light passes nothing of its mesh.
     ///
     /// # Errors
     /// When the adapter does not take what they read.

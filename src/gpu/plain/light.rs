@@ -86,7 +86,7 @@ impl Light {
         Ok(Self { layout, bound, triangles, spread, lights, has_sky, reaching, frame, brightness, bytes })
     }
 
-    /// Set what is drawn next: into so many samples along a pixel's side.
+    /// Set what is drawn next: into `axis` samples along a pixel's side.
     pub(super) fn set(&self, gpu: &Gpu, axis: u32) {
         let frame = [axis, self.brightness.to_bits(), 0, 0];
         gpu.queue.write_buffer(&self.frame, 0, bytemuck::cast_slice(&frame));

@@ -128,7 +128,7 @@ impl Plain {
         })
     }
 
-    /// Set the constants of what is drawn next, into so many samples along a pixel's side.
+    /// Set the constants of what is drawn next, into `axis` samples along a pixel's side.
     pub(super) fn set(&self, gpu: &Gpu, values: &Values<'_>, axis: u32) {
         self.placed.set(gpu, values);
         self.light.set(gpu, axis);

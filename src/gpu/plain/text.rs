@@ -10,7 +10,7 @@ use crate::shader::{Facts, Plan, PlanError};
 /// Rows of a place before those of the lights.
 pub(super) const OWN_ROWS: usize = 5;
 
-/// Rows of four numbers for so many.
+/// Rows of four numbers that hold one for each of `lights` lights.
 pub(super) const fn rows_of(lights: usize) -> usize {
     lights.div_ceil(4)
 }

@@ -21,7 +21,7 @@ pub(super) struct Read {
 }
 
 impl Renderer {
-    /// GPU milliseconds of each of so many frames, drawn one right after another with nothing read back: an
+    /// GPU milliseconds of each of `frames` frames, drawn one right after another with nothing read back: an
     /// adapter that waits for the CPU between frames lowers its clock. Empty where there are no timestamps.
     /// Without the bloom. Levels of the UV atlas are made for each, as where the pose or the light moves from frame to
     /// frame.

@@ -198,7 +198,7 @@ impl Maps {
     }
 }
 
-/// A texture of so many maps; of one texel, where no light has one.
+/// A texture of `layers` maps; of one texel, where no light has one.
 fn texture(gpu: &Gpu, size: u32, layers: usize) -> Result<Texture, GpuError> {
     let limits = gpu.device.limits();
     let (adapter, limit) = (gpu.name().to_owned(), limits.max_texture_dimension_2d);

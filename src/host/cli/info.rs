@@ -1,4 +1,4 @@
-//! `skinfit info`: what there is to compute with, and what will be used.
+//! `skinfit info`: the processor, the graphics adapters, and which will be used.
 
 use super::machine::processor;
 use super::{Exit, Refusal, quieten_graphics, say};

@@ -98,7 +98,7 @@ impl Fitting {
         }
     }
 
-    /// Wait until one that was stopped is over, but no longer than so many seconds: whether it is.
+    /// Wait until one that was stopped is over, but no longer than `seconds`: whether it is.
     fn see_off(&self, py: Python<'_>, seconds: f64) -> PyResult<bool> {
         not_forked()?;
         let (begun, most) = (Instant::now(), Duration::try_from_secs_f64(seconds).unwrap_or_default());

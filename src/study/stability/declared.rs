@@ -85,7 +85,7 @@ impl Declared {
         Ok(Self { setup, params: scene.params.clone(), light, atlas, samples })
     }
 
-    /// How many batches [`search`] tries beside so many cases of the other search.
+    /// How many batches [`search`] tries beside `cases` cases of the other search.
     #[must_use]
     pub fn batches(&self, cases: usize) -> usize {
         1 + self.hard().len() + lit::batches(cases)

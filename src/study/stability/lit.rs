@@ -21,13 +21,13 @@ use crate::model::choices::SpecularModel;
 
 /// Fragments in a batch: each takes a plan of its own, which is most of its time.
 const BATCH: usize = 64;
-/// So many of the other search's cases for each of these batches.
+/// Cases of the other search for each of these batches.
 pub(super) const CASES: usize = 250;
 
-/// At most so many: a long search of the other kind is not to take hours of this one.
+/// Most batches: a long search of the other kind is not to take hours of this one.
 const MOST: usize = 1024;
 
-/// How many batches stand beside so many cases of the other search.
+/// How many batches stand beside `cases` cases of the other search.
 #[must_use]
 pub fn batches(cases: usize) -> usize {
     cases.div_ceil(CASES).min(MOST)

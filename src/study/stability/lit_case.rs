@@ -185,7 +185,7 @@ impl LitBatch {
         (fragments, params)
     }
 
-    /// The records of so many groups, the pixel of each slot, and its coverage; what fills the last group has none.
+    /// The records of `groups` groups, the pixel of each slot, and its coverage; what fills the last group has none.
     #[must_use]
     pub(super) fn records(
         &self,

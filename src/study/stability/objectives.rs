@@ -145,7 +145,7 @@ pub(super) fn weights(coverage: &[f32]) -> Vec<Row> {
     coverage.chunks(LANES).map(|group| Row::of(std::array::from_fn(|lane| group[lane]))).collect()
 }
 
-/// The same target for each pixel of so many groups: three or four channels.
+/// The same target for each pixel of `groups` groups: three or four channels.
 #[must_use]
 pub fn targets(target: &[f32], groups: usize) -> Rows {
     let mut rows = Rows::new(target.len(), groups);

@@ -74,7 +74,7 @@ impl Report {
         }
     }
 
-    /// Take note of a case of so many fragments; those of one name become one row.
+    /// Take note of a case of `count` fragments; those of one name become one row.
     pub fn add(&mut self, (name, hard): (&str, &str), count: usize, verdicts: Vec<Option<Verdict>>) {
         for (sum, verdict) in self.hard.iter_mut().zip(&verdicts) {
             *sum += if verdict.is_some() { count } else { 0 };

@@ -29,8 +29,8 @@ pub struct Found {
 pub struct Tally {
     /// Fragments tried.
     pub tried: usize,
-    /// At least so many of them failed: a batch counts as one where only its sum is wrong, and where enough is known of
-    /// an evaluator already.
+    /// Failed ones among them, at least: a batch counts as one where only its sum is wrong, and where enough is known
+    /// of an evaluator already.
     pub failed: usize,
     /// The worst of all.
     pub worst: Verdict,

@@ -235,7 +235,7 @@ fn a_wrong_slope_and_a_wrong_sum_turn_the_whole_study_red() {
     for (evaluators, words) in wrong {
         let report = study(2, 256).run(&evaluators, &|_| {});
         let failures = report.failures().join("\n");
-        // Of one evaluator so many failures are told and no more, which the hard cases use up before the random search.
+        // Of one evaluator a limited number of failures is told, which the hard cases use up before the random search.
         for place in ["nearly facing", "parameter at a bound"] {
             let told = |line: &str| line.starts_with(place) && line.contains(words);
             assert!(failures.lines().any(told), "{place}: {words} is not told:\n{failures}");

@@ -16,10 +16,10 @@ use crate::reference::ReferenceView;
 use crate::shader::{Budget, Facts, plan};
 use crate::subject::Subject;
 
-/// Views are left out one at a time up to so many; of more, so many parts are left out in turn.
+/// Most folds: one for each view, or for each part of the views where there are more.
 const MOST_FOLDS: usize = 6;
 
-/// Views count as alike from so many dB on: a sixteenth of a step of 8 bits. What a set gains beyond is nothing.
+/// Views count as alike from this PSNR on, in dB: a sixteenth of a step of 8 bits. What a set gains beyond is nothing.
 const ALIKE: f64 = 72.0;
 
 /// What sets are judged by.

@@ -65,7 +65,7 @@ pub trait Watcher {
     /// One more axis is measured; the others are still `pending`.
     ///
     /// # Errors
-    /// When what there is cannot be kept.
+    /// When the study so far cannot be kept.
     fn measured(&mut self, so_far: &Tradeoff) -> Result<(), StudyError>;
 }
 

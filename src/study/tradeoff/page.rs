@@ -235,7 +235,7 @@ pub fn plot(sweep: &Sweep) -> Plot<'_> {
     }
 }
 
-/// How far above the best loss each run was after so many seconds.
+/// How far above the best loss each run was, by seconds.
 fn traces(sweep: &Sweep) -> String {
     let all = || sweep.traces.iter().flat_map(|trace| &trace.points);
     let best = all().map(|point| point.2).fold(f64::INFINITY, f64::min);

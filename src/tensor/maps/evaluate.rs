@@ -52,7 +52,7 @@ struct Tensors {
 }
 
 impl Variables {
-    /// Take a point to the device: constants and the gains of so many views, and maps; the start's for those that are not
+    /// Take a point to the device: constants and the gains of `views` views, and maps; the start's for those that are not
     /// given.
     ///
     /// # Errors

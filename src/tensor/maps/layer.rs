@@ -19,7 +19,7 @@ pub enum Grid {
     },
     /// One a vertex of the mesh.
     Vertices(usize),
-    /// Six faces of so many texels a side, row by row.
+    /// Six faces with this number of texels a side, row by row.
     Cube(usize),
 }
 

@@ -28,7 +28,7 @@ pub fn most_samples(shared: &SharedDevice, fields: Fields) -> usize {
     (bytes / (SAMPLE_BYTES + 4 * fields.numbers() as u64)) as usize
 }
 
-/// The groups of all views in their order, in parts of at most so many samples; a group is never cut.
+/// The groups of all views in their order, in parts of at most `most` samples; a group is never cut.
 #[must_use]
 pub fn cuts(views: &[&ViewSamples], most: usize) -> Vec<Cut> {
     cut(views, most, |_| true)
@@ -119,7 +119,7 @@ mod tests {
     use crate::samples::SurfaceRecords;
     use crate::samples::surface_records::Asked;
 
-    /// A view of groups of so many records each.
+    /// A view of groups with that number of records each.
     fn view(records: &[u32]) -> ViewSamples {
         let ends = records.iter().scan(0, |end, records| {
             *end += records;

@@ -238,7 +238,7 @@ impl Stage {
         gpu.check()
     }
 
-    /// Room for so many numbers, for one submission.
+    /// A buffer of `numbers` numbers, for one submission.
     fn room(&self, numbers: usize) -> Result<Buffer, GpuError> {
         let gpu = self.shared.gpu();
         gpu.scratch("what is kept for the backward pass", 4 * numbers.max(1) as u64)

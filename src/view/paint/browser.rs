@@ -97,7 +97,7 @@ async fn quiet(shared: &Shared) {
     .await;
 }
 
-/// Let the browser do other things for so many milliseconds.
+/// Let the browser do other things for `milliseconds`.
 async fn timeout(milliseconds: u32) {
     let timer = Promise::new(&mut |resolve, _| {
         let timeout = Reflect::get(&global(), &"setTimeout".into());

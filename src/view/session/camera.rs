@@ -22,7 +22,7 @@ impl Default for Orbit {
 }
 
 impl Orbit {
-    /// Turn by so many radians, and take so many times the distance.
+    /// Turn by `yaw` and `pitch`, in radians, and multiply the distance by `distance`.
     pub fn turn(&mut self, yaw: f64, pitch: f64, distance: f64) {
         self.yaw += yaw;
         self.pitch = (self.pitch + pitch).clamp(-1.5, 1.5);

@@ -86,7 +86,7 @@ impl Session {
         }
     }
 
-    /// Turn the environment's light by so many degrees, as part of a drag.
+    /// Turn the environment's light by `degrees`, as part of a drag.
     pub fn turn_light(&mut self, degrees: f64) {
         self.drag(|values| {
             let at = values.params.scalar(Param::EnvironmentRotation) + degrees;

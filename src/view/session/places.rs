@@ -58,7 +58,7 @@ impl Session {
         self.look_at((self.at() + 1) % self.places().len().max(1));
     }
 
-    /// Look at what there is, where it was something else.
+    /// Look at the last scene or view where the one looked at is gone.
     pub(super) fn stay_within(&mut self) {
         let scene = self.at.0.min(self.scenes.len().saturating_sub(1));
         let most = self.scenes.get(scene).map_or(0, |opened| opened.views().len().saturating_sub(1));

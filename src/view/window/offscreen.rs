@@ -67,7 +67,7 @@ pub fn render_state() -> Result<RenderState, ViewError> {
 }
 
 impl Offscreen {
-    /// A window of so many pixels, `scale` of them a point.
+    /// A window of `size` pixels, `scale` of them a point.
     ///
     /// # Errors
     /// When no adapter draws it.

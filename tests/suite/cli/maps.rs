@@ -262,7 +262,7 @@ fn ctrl_c_leaves_the_maps_so_far_and_says_how_to_go_on() {
     let sandbox = Sandbox::new();
     // Without its map, the scene is far from what the constants alone could meet.
     sandbox.edit("color = \"color.png\"\n", "");
-    // A step is all that a round needs to come nearer; so many rounds do not end by themselves.
+    // A step is all that a round needs to come nearer; 1000 rounds do not end by themselves.
     sandbox.edit("loss = ", "maps = { rounds = 1000, steps = 1 }\nloss = ");
     let mut command = sandbox.command(&["fit", "scene.toml", "-o", "run", "--maps", "color"]);
     let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();

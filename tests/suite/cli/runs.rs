@@ -344,7 +344,7 @@ fn a_fit_of_nothing_says_that_nothing_was_free() {
     let free = text.lines().find(|line| line.starts_with("free = ")).unwrap();
     sandbox.edit(free, "free = []");
     let ran = sandbox.fit("run", &[]).done();
-    // How it ended, how good it is and at most so many places where it is wrong, on what, and where.
+    // How it ended, how good it is and at most `MOST` places where it is wrong, on what, and where.
     assert!((4..=4 + MOST).contains(&ran.out.lines().count()), "{ran:?}");
     let page = sandbox.text("run/report.html");
     assert!(page.contains("Nothing was free: ") && page.contains("Nothing was free, so "));

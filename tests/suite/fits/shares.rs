@@ -1,4 +1,4 @@
-//! Parameters that are shares of a whole: fits by every solver within what there is.
+//! Parameters that are shares of a whole: fits by every solver within that whole.
 
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};

@@ -217,7 +217,7 @@ fn assert_close(got: &NormalEquations, want: &NormalEquations, tolerance: f64) {
     }
 }
 
-/// `view`, so many times over.
+/// `view`, `times` times over.
 fn repeated(view: &ObservedView, times: usize) -> ObservedView {
     let repeat = |rows: &Rows| {
         let records = times * rows.all().len() / rows.stride();
@@ -244,7 +244,7 @@ fn repeated(view: &ObservedView, times: usize) -> ObservedView {
 #[test]
 fn a_million_and_ten_million_samples_keep_six_digits() {
     let Some(gpu) = gpu() else { return };
-    // 500 groups of 16, over and over: their sums are so many times the first's.
+    // 500 groups of 16, over and over: their sums are multiples of the first's.
     let small = [view(500, 10)];
     let (unknowns, light) = (some_unknowns(), illumination());
     let point = Point { params: params(), gains: vec![1.0.into()] };

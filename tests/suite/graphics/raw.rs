@@ -22,7 +22,7 @@ use super::exported::as_wgsl;
 /// What a draw writes.
 const FORMAT: TextureFormat = TextureFormat::Rgba32Float;
 const DEPTH: TextureFormat = TextureFormat::Depth32Float;
-/// A texture that is a cube has its sampler so many bindings later.
+/// How many bindings after a texture that is a cube its sampler stands.
 pub(crate) const SAMPLER: u32 = 100;
 
 /// The adapter, with a mesh' triangles.

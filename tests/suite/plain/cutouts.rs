@@ -72,7 +72,7 @@ fn hidden_by(material: &Value, alpha: impl Fn(u32, u32) -> u8) -> Vec<f32> {
     hidden(&under_a_card(material, alpha, |_| {}))
 }
 
-/// Whether of the rays that meet the whole card about so many are stopped, at each vertex.
+/// Whether about `share` of the rays that meet the whole card are stopped, at each vertex.
 fn about(share: f32, got: &[f32], whole: &[f32]) -> bool {
     got.iter().zip(whole).all(|(got, whole)| {
         // Four standard deviations of a coin that is tossed for each of many rays: a few hundredths of the whole, of which

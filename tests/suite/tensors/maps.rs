@@ -38,7 +38,7 @@ fn small() -> Baked {
     small_of(1)
 }
 
-/// Of so many views.
+/// Of its first `views` views.
 fn small_of(views: usize) -> Baked {
     let cache = Path::new(env!("CARGO_TARGET_TMPDIR")).join("graphics");
     let scene = demo::kept_scene(&cache, Some(&cache)).unwrap();
@@ -65,7 +65,7 @@ fn small_of(views: usize) -> Baked {
     loaded.bake().unwrap()
 }
 
-/// The scene with a colour map of so many times its radiance.
+/// The scene with a colour map of `factor` times its radiance.
 fn darkened(baked: Baked, factor: f32) -> Baked {
     baked.with_scene(|scene| darken(&mut scene.maps.color, factor))
 }

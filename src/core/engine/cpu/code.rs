@@ -74,7 +74,8 @@ pub(super) enum Op {
     FromProductUU(Uniform, Uniform),
     /// What needs all of the processor's registers, from memory to memory; A is lost.
     Heavy(Box<Heavy>),
-    /// Unit vectors; A is lost. Where every sample has one, so many operations are left out.
+    /// Unit vectors; A is lost. Where every sample has one, the operations after it are skipped, as many as the number
+    /// says.
     Unit(Box<CallOf>, Register, usize),
 }
 

@@ -11,7 +11,7 @@ use crate::samples::LANES;
 use crate::samples::rows::Row;
 use crate::simd::Simd;
 
-/// Records whose outputs stand side by side, at most: a Gram matrix adds up so many at once.
+/// Records whose outputs stand side by side, at most: a Gram matrix adds up as many at once.
 pub(super) const BATCH: usize = 16;
 /// The same of a function that looks nothing up. It is over so soon that what counts is whether its outputs, some forty
 /// columns, are still in the first cache when they are added up; one that looks texels up waits less for these in longer batches.

@@ -29,7 +29,7 @@ impl<R> Default for Record<R> {
 }
 
 impl<R: Number> Record<R> {
-    /// So many leaves of so many texels, in memory that others have left. What stands there is theirs.
+    /// `leaves` leaves of each of `texels` texels, in memory that others have left. What stands there is theirs.
     pub(super) fn within(mut memory: Vec<R>, leaves: usize, texels: usize) -> Self {
         let (stride, count) = (Self::stride(leaves), Self::room(leaves, texels));
         if memory.len() < count {
@@ -39,17 +39,17 @@ impl<R: Number> Record<R> {
         Self { stride, texels, numbers: memory }
     }
 
-    /// Numbers of a texel with so many leaves.
+    /// Numbers of a texel with `leaves` leaves.
     fn stride(leaves: usize) -> usize {
         (3 * leaves).next_multiple_of(WIDE)
     }
 
-    /// Numbers that a record of so many leaves of so many texels takes.
+    /// Numbers that a record of `leaves` leaves of each of `texels` texels takes.
     pub(super) fn room(leaves: usize, texels: usize) -> usize {
         Self::stride(leaves) * texels + LANES
     }
 
-    /// So many leaves of so many texels, all 0.
+    /// `leaves` leaves of each of `texels` texels, all 0.
     pub(super) fn new(leaves: usize, texels: usize) -> Self {
         Self::within(Vec::new(), leaves, texels)
     }

@@ -84,7 +84,7 @@ pub(super) fn order<R: Number>(pass: &LevelPass, made: &Made<R>) -> Vec<usize> {
     }
 }
 
-/// Numbers of levels of which so many stand side by side are read together, not one by one.
+/// Numbers of levels are read together, not one by one, where this number of them stand side by side.
 const TOGETHER: usize = 3;
 
 /// The blocks of fields that are read together.
@@ -242,8 +242,8 @@ impl<'a, R: Number> Run<'a, R> {
         })
     }
 
-    /// The pass' record: `then` makes the numbers of up to sixteen texels of the first one's place and what the steps yield;
-    /// so many numbers a texel.
+    /// The pass' record: `then` makes the numbers of up to sixteen texels of the first one's place and what the steps
+    /// yield; its last argument is how many numbers a texel has.
     #[inline(always)]
     fn blocks<S: Simd>(
         &self,

@@ -19,7 +19,7 @@ pub trait Wide<R, S: Simd>: Copy + Add<Output = Self> + Sub<Output = Self> + Mul
     /// These numbers from a place on.
     fn load(simd: S, numbers: &[R], at: usize) -> Self;
 
-    /// The same number so many times.
+    /// The number in each lane.
     fn splat(simd: S, number: R) -> Self;
 
     /// `self * a + b`, in one rounding where the hardware has it.

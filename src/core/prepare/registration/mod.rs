@@ -32,7 +32,7 @@ use image::Picture;
 use residual::Colors;
 use solve::Found;
 
-/// Images are compared at most at so many pixels along their longer side, which bounds what a step costs.
+/// Most pixels along the longer side at which images are compared, which bounds what a step costs.
 const FINEST: u32 = 512;
 /// The first size: a camera that is off by a tenth of the image is a few pixels off there.
 const COARSEST: u32 = 64;

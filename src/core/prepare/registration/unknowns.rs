@@ -48,7 +48,7 @@ impl Pixels {
         Some(Self { middle, unit: [turn, turn, turn, shift, shift, depth / border, 1.0 / border] })
     }
 
-    /// The camera moved by so many pixels along each unknown.
+    /// The camera moved by `by` along each unknown, in pixels.
     pub(super) fn moved(&self, camera: &Camera, by: &[f64; COUNT]) -> Camera {
         let by: [f64; COUNT] = std::array::from_fn(|i| by[i] * self.unit[i]);
         let turn = DQuat::from_scaled_axis(DVec3::new(by[0], by[1], by[2]));

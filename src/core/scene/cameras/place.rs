@@ -176,7 +176,7 @@ fn rigid(source: &Source, value: &Spanned<Vec<f64>>) -> Result<DMat4, SceneError
     Ok(matrix)
 }
 
-/// Say where a matrix of so many columns holds what is not finite.
+/// Say where a matrix of `columns` columns holds what is not finite.
 pub(in crate::scene) fn all_finite(rows: &[f64], columns: usize) -> Result<(), String> {
     match rows.iter().position(|number| !number.is_finite()) {
         Some(i) => Err(format!("holds {} at row {}, column {}", rows[i], i / columns, i % columns)),

@@ -17,7 +17,7 @@ const REC709: [f32; 3] = [0.212_639, 0.715_169, 0.072_192];
 /// Half of the distance of halves, of a number.
 const HALF: f32 = 1.0 / 2048.0;
 
-/// A file that no library at hand writes: halves, with a sample of chroma for so many pixels across and down.
+/// A file that no library at hand writes: halves, with chroma subsampled across and down.
 #[derive(Clone)]
 struct File {
     header: Header,

@@ -41,7 +41,7 @@ use super::rule::{Kernel, Rule};
 use super::search::{Carried, Found, PlanError};
 use crate::model::diffusion::Seams;
 
-/// Levels that a draw leaves: an adapter writes into so many textures at once, by WebGPU's defaults.
+/// Levels that a draw leaves: as many textures as an adapter writes into at once, by WebGPU's defaults.
 const LEVELS_A_DRAW: usize = 4;
 
 /// Texels that a workgroup of a blur takes, along its axis and across; that of another pass takes [`TEXELS`] of the list.

@@ -51,7 +51,7 @@ pub(super) fn tell_run(
     say(&format!("{}: final loss {:.6e}", folder.display(), outcome.loss_end))
 }
 
-/// The fitted values as a small table, and how the fit ended after so many seconds of the command.
+/// The fitted values as a small table, and how the fit ended, `whole` seconds into the command.
 fn tell_outcome(outcome: &Outcome, run: &RunInfo, whole: f64) -> Result<(), Refusal> {
     for unknown in &outcome.unknowns {
         let name = run.label(&unknown.unknown.name());

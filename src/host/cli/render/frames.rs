@@ -37,21 +37,21 @@ pub(super) fn turntable(camera: &Camera, mesh: &Mesh, count: u32, output: &Path)
 /// How many frames an animation has, and at which times.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Pace {
-    /// So many from its first key to its last, evenly.
+    /// A number of frames from its first key to its last, evenly.
     Even(u32),
-    /// So many a second; all of it once, or so many frames, which begin again where it ends.
+    /// Frames a second; all of it once, or a number of frames, which begin again where it ends.
     Rate(f64, Option<u32>),
-    /// So many a second of that many rounds, of which each ends where the next begins.
+    /// Frames a second, and a number of rounds, of which each ends where the next begins.
     Rounds(f64, u32),
 }
 
 /// The most frames of a sequence.
 pub(super) const MOST: u32 = 100_000;
-/// Of a frame: a time that misses a key by less is its time. Keys are f32, which at ten thousand frames have so many digits.
+/// Of a frame: a time that misses a key by less is its time. Keys are f32, whose digits end there at ten thousand frames.
 pub(super) const ROUNDING: f64 = 1e-3;
 
 impl Pace {
-    /// How many frames an animation of so many seconds has; `None` beyond [`MOST`].
+    /// How many frames an animation of `seconds` seconds has; `None` beyond [`MOST`].
     pub(super) fn count(self, seconds: f64) -> Option<u32> {
         let count = match self {
             Self::Even(count) | Self::Rate(_, Some(count)) => f64::from(count),

@@ -71,11 +71,11 @@ pub(super) struct Arguments {
     exposure: f32,
     #[command(flatten)]
     engine: engine::EngineArguments,
-    /// Render so many frames: a whole turn of the camera about the mesh's vertical axis.
+    /// Render N frames: a whole turn of the camera about the mesh's vertical axis.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(frames::MOST)), help_heading = "Sequences")]
     frames: Option<u32>,
-    /// Let the frames go through the mesh's animation instead, the camera standing still: so many from its first key to
-    /// its last, or with --fps at its own speed.
+    /// Let the frames go through the mesh's animation instead, the camera standing still: --frames of them from its
+    /// first key to its last, or with --fps at its own speed.
     #[arg(long, requires = "length", help_heading = "Sequences")]
     animate: bool,
     /// Frames a second of the animation: all of it once, or --frames of them, which begin again where it ends.
@@ -88,7 +88,7 @@ pub(super) struct Arguments {
     /// moves, or `frames`, by a bake of each frame.
     #[arg(long, value_name = "HOW", default_value = "targets", value_parser = ["targets", "frames"], requires = "animate", help_heading = "Sequences")]
     occlusion: String,
-    /// Of --occlusion frames: bake so many poses a second of the animation, and have those between by lines.
+    /// Of --occlusion frames: bake RATE poses a second of the animation, and interpolate linearly between them.
     #[arg(long, value_name = "RATE", value_parser = parse_rate, requires = "animate", help_heading = "Sequences")]
     occlusion_rate: Option<f64>,
     /// Print what a frame took: GPU time by pass, uploaded bytes, bindings.

@@ -26,7 +26,7 @@ pub enum Holds {
     Zero,
     /// No colour depends on this parameter: the derivative is 0 to the bit.
     Flat(Param),
-    /// Of each so many fragments, all have the first one's colour.
+    /// All fragments of a group of this size have the first one's colour.
     Alike(usize),
 }
 

@@ -61,7 +61,7 @@ impl Fits {
         }
     }
 
-    /// The seconds that [`Self::measure`] takes for runs of so many passes over all scenes.
+    /// The seconds that [`Self::measure`] takes for runs of `passes` passes over all scenes.
     pub(super) fn seconds(passes: &[f64], rates: &[Rates]) -> f64 {
         let (pass, images) =
             rates.iter().fold((0.0, 0.0), |(pass, images), rates| (pass + rates.pass, images + rates.images));

@@ -151,7 +151,7 @@ mod tests {
         };
         let foretold = swept
             .expected(&[1, 2, 4, 8], Probe { whole: 0.6, counted: 0.5 }, 0.25, &|value| f64::from(value));
-        // Works of 0.35, 0.6, 1.1 and 2.1 s: once for the images with 0.25 s and so many seconds of samples each, once
+        // Works of 0.35, 0.6, 1.1 and 2.1 s: once for the images with 0.25 s and 1, 2, 4 or 8 s of samples each, once
         // to warm up, and three rounds, the least, as all are short and one round takes more than a second.
         let works = 0.35 + 0.6 + 1.1 + 2.1;
         // Sums of a few numbers, in another order.

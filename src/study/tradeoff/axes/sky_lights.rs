@@ -30,7 +30,7 @@ fn counts(bench: &Bench<'_>) -> Vec<u32> {
     counts
 }
 
-/// What was found with so many.
+/// What was found with `count` lights at most.
 struct Found {
     count: u32,
     /// How many there are: an even sky has fewer.
@@ -89,7 +89,7 @@ impl SceneAxis for SkyLights {
     }
 }
 
-/// The scene with so many lights, baked and sampled anew; with as many as it has, as it stands.
+/// The scene with `count` lights, baked and sampled anew; with as many as it has, as it stands.
 fn with(bench: &Bench<'_>, count: u32) -> Result<Found, StudyError> {
     let scene = &bench.baked.scene;
     let named = |error| StudyError::Light { scene: scene.path.display().to_string(), error };

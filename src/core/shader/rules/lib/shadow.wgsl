@@ -118,7 +118,7 @@ fn shadow_compared(map: f32, place: vec3f, normal: vec3f, toward: vec3f) -> f32 
     return shadow_compare(map, shadow_raised(map, place, normalize_or(normal, toward), toward).xyz);
 }
 
-// Comparisons within a radius of so many texels.
+// Comparisons within the map's radius, in texels.
 fn shadow_filtered(map: f32, place: vec3f, normal: vec3f, toward: vec3f) -> f32 {
     if (map < 0.0) {
         return 1.0;
