@@ -36,7 +36,7 @@ pub enum GpuError {
     /// There are adapters, but not that one.
     #[error("no graphics adapter's name contains `{wanted}`. There is: {found}.")]
     NoSuchAdapter {
-        /// What was asked for.
+        /// The requested part of a name.
         wanted: String,
         /// Names of the adapters, with commas.
         found: String,

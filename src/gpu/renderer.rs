@@ -50,7 +50,7 @@ pub struct Frame {
     pub image: Image,
     /// Pixels that reached the end of 16-bit targets' range.
     pub clipped: usize,
-    /// GPU time by pass; empty where it is not asked for, or the adapter has no timestamps.
+    /// GPU time by pass; empty where it is not requested, or the adapter has no timestamps.
     pub times: Vec<PassTime>,
 }
 
@@ -62,7 +62,7 @@ pub struct Renderer {
     facts: Facts,
     /// Weights of the kept morph targets.
     morph_weights: Vec<f32>,
-    /// The whole, and parts of it that were asked for.
+    /// The whole, and the requested parts of it.
     programs: Vec<Drawer>,
     /// What is not skin, where the mesh has such parts.
     plain: Option<Plain>,

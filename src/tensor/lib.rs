@@ -75,7 +75,7 @@ pub enum TensorError {
         what: &'static str,
         /// Its shape.
         found: Vec<usize>,
-        /// The shape that is asked for.
+        /// The shape that it must have.
         wanted: Vec<usize>,
     },
     /// No shader yields the image, or its derivatives.

@@ -1,6 +1,6 @@
 //! Images, and how far they are from their targets, made beside the window.
 //!
-//! Of each slot the latest request wins: what was asked for before it is not drawn any more. An image is answered as soon
+//! Of each slot the latest request wins: requests before it are not drawn any more. An image is answered as soon
 //! as it is there; its scores and terms follow when nothing else waits.
 //!
 //! - `work`: what is done; `thread`: on a thread; `browser`: between the events of a browser's worker
@@ -48,7 +48,7 @@ impl Slot {
     pub const ALL: [Self; 4] = [Self::Now, Self::Fit, Self::Start, Self::Other];
 }
 
-/// An image that is asked for.
+/// A requested image.
 #[derive(Clone, Debug)]
 pub struct Job {
     /// Its scene.
@@ -76,7 +76,7 @@ pub struct Painted {
     pub compared: Option<Compared>,
     /// How long it took, read back.
     pub seconds: f64,
-    /// What was asked for.
+    /// The request.
     pub job: Arc<Job>,
     /// Whether it has a sample a pixel until one with all of the scene's follows.
     pub quick: bool,
@@ -124,7 +124,7 @@ pub struct Engine {
 /// Is called when there is an answer.
 pub type Wake = Arc<dyn Fn() + Send + Sync>;
 
-/// How long nothing is asked for before scores and terms follow, milliseconds: a slider that is moved comes first.
+/// Milliseconds without a request before scores and terms follow: a slider that is moved comes first.
 const QUIET: u32 = 60;
 
 /// The worker.
@@ -143,7 +143,7 @@ struct Shared {
 #[derive(Default)]
 struct Wanted {
     jobs: BTreeMap<Slot, Arc<Job>>,
-    /// Images whose scores and terms are to follow, once nothing is asked for that long.
+    /// Images whose scores and terms are to follow, after `QUIET` without a request.
     follow: BTreeMap<Slot, Painted>,
     /// What is being done.
     under_way: bool,
@@ -157,14 +157,14 @@ impl Shared {
         self.wanted.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Whether an image is asked for.
+    /// Whether a request is open.
     fn is_asked(&self) -> bool {
         !self.wanted().jobs.is_empty()
     }
 }
 
 impl Wanted {
-    /// What is done next: what is asked for, or after a `quiet` time what follows; `None` when there is nothing.
+    /// What is done next: a requested image, or after a `quiet` time what follows; `None` when there is nothing.
     fn next(&mut self, quiet: bool) -> Option<Piece> {
         let (slot, next) = match self.jobs.pop_first() {
             Some((slot, job)) => (slot, Next::Paint(job)),
@@ -195,7 +195,7 @@ impl PaintWorker {
         Self { shared, answers, task }
     }
 
-    /// Have an image drawn, in the place of the one that was asked for in this slot.
+    /// Have an image drawn, in the place of the one requested in this slot.
     pub fn ask(&self, slot: Slot, job: Arc<Job>) {
         let mut wanted = self.shared.wanted();
         wanted.follow.remove(&slot);
@@ -209,10 +209,10 @@ impl PaintWorker {
         self.answers.try_iter()
     }
 
-    /// Whether everything that was asked for is answered.
+    /// Whether every request is answered.
     #[must_use]
     pub fn is_idle(&self) -> bool {
-        // What a worker that has ended was asked for never comes.
+        // Requests to a worker that has ended are never answered.
         if self.task.is_over() {
             return true;
         }

@@ -1,9 +1,9 @@
-//! All that the window holds, without a widget: the scenes, the values that one edits, the images that are asked for, the
-//! fit that runs.
+//! All that the window holds, without a widget: the scenes, the values that one edits, the requested images, the fit
+//! that runs.
 //!
 //! - `opening`: scenes and runs that are read; `edits`: what one does to the values; `places`: which view is looked at,
 //!   and `camera`: from where
-//! - `images`: which are asked for, and what effects change in them
+//! - `images`: which are requested, and what effects change in them
 //! - `known`: what is known of a parameter beside its value
 //! - `fits`: the fit beside the window; `files`: constants and scenes as files; `aside`: what is written beside the window
 
@@ -306,7 +306,7 @@ impl Session {
         self.opening.is_some() || self.next.is_some()
     }
 
-    /// Whether all that is asked for is there.
+    /// Whether nothing is being opened, fitted, drawn or written.
     #[must_use]
     pub fn is_idle(&self) -> bool {
         !self.is_opening() && self.fitting.is_none() && self.painter.is_idle() && self.aside.is_idle()

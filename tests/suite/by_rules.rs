@@ -155,7 +155,7 @@ impl<T: Copy> Cubes<T> {
     }
 }
 
-/// What rules are asked for beside radiance and haze: how these move with parameters, and quantities on the way.
+/// Outputs wanted of rules beside radiance and haze: how these move with parameters, and quantities on the way.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Wanted {
     pub(crate) free: Vec<Param>,

@@ -22,7 +22,7 @@ pub(crate) struct Segment {
     pub(crate) origin: Vec3A,
     /// Of unit length.
     pub(crate) direction: Vec3A,
-    /// Where it ends; below 0 it is not asked for.
+    /// Where it ends; below 0 it is not traced.
     pub(crate) t_max: f32,
 }
 

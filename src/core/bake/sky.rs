@@ -49,7 +49,7 @@ pub fn sees_skin(scene: &Scene, fields: Fields) -> bool {
 pub struct SkyBake {
     /// What arrives at each vertex of it.
     pub transfer: VertexTransfer,
-    /// The environment, where its light is asked for.
+    /// The environment, where its light is to be baked.
     pub light: Option<SkyLight>,
 }
 

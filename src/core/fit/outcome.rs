@@ -25,7 +25,7 @@ pub struct Outcome {
     pub correlations: Vec<f64>,
     /// What the standard errors rest on.
     pub errors: ErrorBasis,
-    /// How far the loss lets the weakest unknown go, where there is a weak one and the profile was asked for.
+    /// How far the loss lets the weakest unknown go, where there is a weak one and the profile was requested.
     pub profile: Option<Profile>,
     /// Directions in which the loss does not change: the images cannot determine these.
     pub undetermined: Vec<Direction>,

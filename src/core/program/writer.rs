@@ -145,7 +145,7 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// A call's value and how it moves along all that is asked for, in one instruction.
+    /// A call's value and its wanted slopes, in one instruction.
     fn want_call(&mut self, id: Id) {
         let Some(Call { native, arguments, along }) = self.graph.call_of(id).cloned() else { return };
         let hot = native.hot();
@@ -223,7 +223,7 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// The call of a function's value, where it is asked for.
+    /// The call of a function's value, where the graph has one.
     fn value_of(&self, native: Native, arguments: &[Id]) -> Option<Id> {
         self.graph.known_call(&Call { native, arguments: arguments.to_vec(), along: Vec::new() })
     }

@@ -244,7 +244,7 @@ impl Atlas {
         &self.cells
     }
 
-    /// The row of a record that holds a number; `None` where it was not asked for.
+    /// The row of a record that holds a number; `None` where the records lack it.
     #[must_use]
     pub fn row(&self, input: &Input) -> Option<usize> {
         self.inputs.iter().position(|held| held == input)

@@ -60,7 +60,7 @@ pub struct PosedSurface<'a> {
     /// The chart of the UV atlas that each vertex is of, where effects are computed there.
     pub(super) charts: Vec<u32>,
     supplies: Supplies<'a>,
-    /// What rays into specular lobes find, where that is asked for.
+    /// What rays into specular lobes find, where such rays are traced.
     pub(super) lobes: Option<Lobes<'a>>,
 }
 

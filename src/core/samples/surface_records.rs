@@ -124,7 +124,7 @@ pub struct Places {
 }
 
 impl Places {
-    /// The places of what is asked for, and how many rows a record has.
+    /// The places of the requested fields, and how many rows a record has.
     fn new(asked: Asked) -> (Self, usize) {
         let mut rows = 0;
         let mut place = |wanted: bool, size: usize| {
@@ -257,7 +257,7 @@ pub struct SurfaceRecords {
 }
 
 impl SurfaceRecords {
-    /// `count` records of what is asked for, all zero.
+    /// `count` records of the requested fields, all zero.
     #[must_use]
     pub fn new(asked: Asked, count: usize) -> Self {
         let (places, stride) = Places::new(asked);

@@ -143,7 +143,7 @@ impl<'a> Inside<'a> {
 
     /// The light's way to each of at most [`LANES`] points; none where nothing lies between.
     fn ways(&self, hits: &[Hit], light: &Light) -> [Option<Way>; LANES] {
-        // What is not asked for has no length.
+        // Rays that are not to be traced have no length.
         let mut rays = [Segment { origin: glam::Vec3A::ZERO, direction: glam::Vec3A::Z, t_max: -1.0 }; LANES];
         let mut from = [(DVec3::ZERO, DVec3::ZERO, 0.0); LANES];
         for (k, &hit) in hits.iter().enumerate() {

@@ -162,7 +162,7 @@ impl<'a> Shadows<'a> {
     /// Which of the rays that are given for places nothing stands in the way of: unit directions and lengths.
     fn packet(&self, from: &Places, ray: impl Fn(usize) -> Option<(Vec3A, f32)>) -> [bool; LANES] {
         let mut open = [false; LANES];
-        // What is not asked for has no length.
+        // Rays that are not to be traced have no length.
         let mut rays = [Segment { origin: Vec3A::ZERO, direction: Vec3A::Z, t_max: -1.0 }; LANES];
         for (k, place) in from.places().iter().enumerate() {
             rays[k].origin = place.origin;

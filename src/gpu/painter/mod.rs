@@ -40,9 +40,9 @@ pub enum PaintError {
 pub struct Picture {
     /// Radiance, premultiplied by alpha, which is the coverage.
     pub image: Image,
-    /// An image for each term and what stands behind the mesh, where layers are asked for.
+    /// An image for each term and what stands behind the mesh, where layers are requested.
     pub layers: Vec<(String, Image)>,
-    /// The haze of each pixel, where it is asked for and an effect makes one.
+    /// The haze of each pixel, where it is requested and an effect makes one.
     pub haze: Vec<f32>,
     /// What was brighter than 16-bit formats hold.
     pub cut: Cut,

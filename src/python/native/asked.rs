@@ -16,7 +16,7 @@ use crate::errors::Refused;
 use crate::scene::Read;
 use crate::words::in_python;
 
-/// A fit that is asked for.
+/// A requested fit.
 pub(crate) struct Asked {
     reads: Vec<Arc<Read>>,
     hold_out: Vec<String>,

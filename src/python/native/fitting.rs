@@ -1,5 +1,5 @@
 //! A fit, step by step: the command line's own, on a thread of its own. It waits after each step until the next one is
-//! asked for, so that whoever watches it may stop it there.
+//! requested, so that whoever watches it may stop it there.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -42,7 +42,7 @@ impl Painted {
         Ok(Self { painter: CpuPainter::new(&baked)?, view, params, warnings: baked.warnings })
     }
 
-    /// Whether it draws what is asked for, but for weights.
+    /// Whether it draws the view at these values, but for weights.
     fn draws(&self, view: &str, values: &Values) -> bool {
         self.view.name == view && self.params.differ_in_weights_alone(&values.params)
     }

@@ -30,7 +30,7 @@ pub(crate) struct Function {
     maps: Vec<Map>,
 }
 
-/// The adapters that were opened, by what they were asked for by.
+/// The adapters that were opened, by the names that they were requested by.
 #[derive(Default)]
 struct Adapters(Vec<(Option<String>, SharedDevice)>);
 
@@ -167,8 +167,8 @@ impl Adapters {
     }
 }
 
-/// Do some work on the thread of the tensors and wait for it. After Ctrl-C nobody waits for it any more; what is asked for
-/// next comes after it.
+/// Do some work on the thread of the tensors and wait for it. After Ctrl-C nobody waits for it any more; the next job
+/// comes after it.
 fn there<T: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce(&mut Adapters) -> Result<T, Refused> + Send + 'static,

@@ -110,7 +110,7 @@ impl FragmentInputs {
     }
 }
 
-/// A vertex at rest, whose frame is asked for.
+/// A vertex at rest, whose frame is to be found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VertexInputs {
     /// Normal, of any length.

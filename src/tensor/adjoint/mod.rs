@@ -1,11 +1,11 @@
 //! The image of stored samples, and its vector-Jacobian product, as compute shaders over buffers of tensors.
 //!
 //! The forward module shades pixels from what a tensor may stand for: the maps' values at each sample, and the
-//! cubes. The backward module takes an adjoint of the image (how a loss moves with each pixel) and yields the
-//! adjoint of whatever is asked for: the planner's rules tell how a sample's colour moves along a seed (their
-//! [`tangents`](crate::shader::tangent)), and its dot product with the pixel's adjoint is what the seed gets. What a sample
-//! reads alone is written where it stands; free columns are added up in a tree over each workgroup; the light of a
-//! cube is left sample by sample with the place of its lookup, to be scattered to the texels.
+//! cubes. The backward module takes an adjoint of the image (how a loss moves with each pixel) and yields the adjoint
+//! of each requested input: the planner's rules tell how a sample's colour moves along a seed (their
+//! [`tangents`](crate::shader::tangent)), and its dot product with the pixel's adjoint is what the seed gets. What a
+//! sample reads alone is written where it stands; free columns are added up in a tree over each workgroup; the light of
+//! a cube is left sample by sample with the place of its lookup, to be scattered to the texels.
 
 mod backward;
 mod constants;

@@ -9,7 +9,7 @@
 //! - [`problem`]: the loss of the images and the priors, and its slope by a layer's texels
 //! - [`cg`]: projected conjugate gradients; [`adam`]: burn's Adam
 //! - [`layers`]: the maps that a fit begins with, and what they show; [`parts`]: samples in parts that fit a buffer
-//! - [`task`]: what is asked for; [`fit`]: the rounds over maps and constants
+//! - [`task`]: what is to be fitted, and how; [`fit`]: the rounds over maps and constants
 //! - [`pictures`]: maps as images
 //! - [`function`]: images and their loss as functions of constants and maps, with gradients, for solvers elsewhere;
 //!   `evaluate`: a point of them on the device; `pixels`: what they are evaluated over

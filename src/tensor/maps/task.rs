@@ -1,4 +1,4 @@
-//! What a fit of maps is asked for.
+//! What a fit of maps is to do.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;

@@ -12,7 +12,7 @@ use wasm_bindgen_futures::{JsFuture, spawn_local};
 use super::work::{Piece, Work};
 use super::{QUIET, Shared};
 
-/// Who waits for something to be asked for.
+/// Who waits for a request.
 #[derive(Default)]
 pub(super) struct Changed(Mutex<Option<Waker>>);
 
@@ -82,7 +82,7 @@ async fn next(shared: &Shared) -> Option<Piece> {
     }
 }
 
-/// Wait for a while, or until something is asked for.
+/// Wait for a while, or until a request comes.
 async fn quiet(shared: &Shared) {
     let mut timer = pin!(timeout(QUIET));
     poll_fn(|context| {

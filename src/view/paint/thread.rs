@@ -7,7 +7,7 @@ use std::time::Duration;
 use super::work::{Piece, Work};
 use super::{QUIET, Shared};
 
-/// Who waits for something to be asked for.
+/// Who waits for a request.
 #[derive(Default)]
 pub(super) struct Changed(Condvar);
 

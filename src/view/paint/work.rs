@@ -1,4 +1,4 @@
-//! What the worker does: what is asked for first, then scores and terms of what was drawn.
+//! What the worker does: requested images first, then scores and terms of what was drawn.
 
 use std::sync::Arc;
 use std::sync::mpsc::Sender;
@@ -101,8 +101,8 @@ impl Work {
         }
     }
 
-    /// What follows an image: it with all samples, its terms, its scores. What is asked for in between comes first: then
-    /// what is there is given back, to be followed once more.
+    /// What follows an image: it with all samples, its terms, its scores. Requests in between come first: then the
+    /// image so far is given back, to be followed once more.
     async fn follow(&mut self, slot: Slot, mut painted: Painted, shared: &Shared) -> Option<Painted> {
         let job = Arc::clone(&painted.job);
         if painted.quick || painted.cold {

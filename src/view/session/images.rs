@@ -1,4 +1,4 @@
-//! Images: which are asked for, which are shown, and what an effect changed in them.
+//! Images: which are requested, which are shown, and what an effect changed in them.
 
 use std::sync::Arc;
 

@@ -18,7 +18,7 @@ use crate::start::{Run, Start};
 /// Scenes that are being read.
 pub(super) struct Opening {
     scenes: Receiver<Result<Vec<Opened>, String>>,
-    /// The effects that were asked for in each, where not the file's own.
+    /// The requested effects of each, where not the file's own.
     effects: Vec<Option<Effects>>,
 }
 
@@ -56,7 +56,7 @@ impl Session {
         }
     }
 
-    /// Go over to what was asked for, once it is opened; what cannot be opened is told, and this stays.
+    /// Go over to the requested scenes, once they are opened; what cannot be opened is told, and this stays.
     pub(super) fn follow_next(&mut self) {
         let Some(mut next) = self.next.take().filter(|_| self.fitting.is_none()) else { return };
         next.follow_opening();

@@ -39,7 +39,7 @@ pub struct Window {
     run: String,
     /// The session's.
     number: u64,
-    /// A screenshot that was asked for.
+    /// A requested screenshot.
     screenshot: Option<Receiver<Arc<egui::ColorImage>>>,
 }
 

@@ -115,7 +115,7 @@ pub(crate) const MOUSE: [(&str, &str); 7] = [
     ("double click on a name", "reset the parameter to where it began"),
 ];
 
-/// What was asked for by keys since the last frame; but for a few, none is taken from a field that is being written in.
+/// Actions by keys since the last frame; but for a few, none is taken from a field that is being written in.
 pub(crate) fn asked(ctx: &egui::Context) -> Vec<Action> {
     let writing = ctx.text_edit_focused();
     // A list that stands open is closed by Escape, and nothing else is.

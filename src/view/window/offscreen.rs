@@ -107,7 +107,7 @@ impl Offscreen {
         self.draw(output)
     }
 
-    /// Whether the window is complete: nothing is asked for that is not there.
+    /// Whether the window is complete: no request is open.
     #[must_use]
     pub fn is_idle(&self) -> bool {
         self.window.session.is_idle()
@@ -124,7 +124,7 @@ impl Offscreen {
                 return Err(ViewError::Scene(self.window.session.told().join("\n")));
             }
             if self.is_idle() {
-                // Answers that have come since are taken in and asked for anew, and bars find their sizes.
+                // Answers that have come since are taken in and requested anew, and bars find their sizes.
                 let mut last = texture;
                 for _ in 0..4 {
                     last = self.frame()?;

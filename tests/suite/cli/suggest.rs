@@ -21,7 +21,7 @@ fn what_made_the_targets_is_found_and_fitted() {
     for effect in ["diffuse", "normal_map", "occlusion", "rim"] {
         assert!(chosen.iter().any(|name| name == effect), "{effect}: {chosen:?}\n{}", ran.out);
     }
-    // Each step on the way up is worth what was asked for.
+    // Each step on the way up is worth the gain required.
     let sets = results["sets"].as_array().unwrap();
     let score = |place: usize| sets[place]["held_out"].as_f64().unwrap();
     let steps = results["steps"].as_array().unwrap();

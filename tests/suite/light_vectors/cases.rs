@@ -15,9 +15,9 @@ use skinfit::samples::{LANES, SurfaceRecords, ViewSamples};
 pub(super) struct Cases {
     pub(super) setup: Setup,
     pub(super) environment: Environment,
-    /// What the cases' parameters may differ in, and how their images move with it where that is asked for.
+    /// What the cases' parameters may differ in, and how their images move with it where slopes are wanted.
     pub(super) columns: Vec<Param>,
-    /// Whether it is asked for.
+    /// Whether slopes are wanted.
     pub(super) slopes: bool,
     pub(super) each: Vec<Case>,
 }
@@ -85,7 +85,7 @@ impl Case {
 }
 
 impl Cases {
-    /// The cases of each view of a fit: where slopes are asked for a view's gain picks its only one.
+    /// The cases of each view of a fit: where slopes are wanted, a view's gain picks its only one.
     pub(super) fn views(&self) -> Vec<Range<usize>> {
         let count = self.each.len();
         if self.slopes { (0..count).map(|i| i..i + 1).collect() } else { std::iter::once(0..count).collect() }

@@ -32,7 +32,7 @@ fn observed(samples: ViewSamples, count: usize) -> ObservedView {
     ObservedView { samples, target, weight, clip: None }
 }
 
-/// What cases differ in is free, whether or not slopes are asked for: nothing that it moves is kept.
+/// What cases differ in is free, whether or not slopes are wanted: nothing that it moves is kept.
 fn task(cases: &Cases) -> Task {
     let view = |which: Range<usize>| observed(cases.samples(which.clone()), which.len());
     Task {

@@ -30,7 +30,7 @@ fn small(effects: Option<Effects>) -> Baked {
 #[test]
 fn drawn_samples_give_the_image_and_the_gradients_of_the_same_samples_uploaded() {
     let Some(shared) = shared() else { return };
-    // With all that the scene shows, and with little: records and tensors hold what is asked for alone.
+    // With all that the scene shows, and with little: records and tensors hold the requested fields alone.
     for effects in [None, Some(Effects::of(&[Effect::Diffuse, Effect::Rim]))] {
         let baked = small(effects);
         let asked = |param: &Param| param.asked_for(baked.setup().effects);

@@ -156,7 +156,7 @@ impl Tapes {
 
 impl Pass {
     /// The tapes of a fit whose environment is `turned`, or will be: those of a plan that is compiled ahead where there
-    /// is one that yields all that is asked for.
+    /// is one that yields all outputs of the fit.
     pub(super) fn new(fitted: &Fitted, turned: bool) -> Result<Self, ShadingError> {
         let free = fitted.free();
         let held = |field: &str| fitted.places.fields().any(|(name, ..)| name == field);

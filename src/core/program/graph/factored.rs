@@ -89,7 +89,7 @@ impl<M: Fn(&Graph, Id) -> bool> Factoring<'_, M> {
         self.moved[id.index()] = Some(made);
     }
 
-    /// The products that a sum adds up, in their order. A sum within it that is asked for elsewhere too is one number.
+    /// The products that a sum adds up, in their order. A sum within it that is used elsewhere too is one number.
     fn addends(&mut self, sum: Id) -> Vec<Addend> {
         let (mut addends, mut open) = (Vec::new(), vec![(sum, false)]);
         while let Some((id, negative)) = open.pop() {

@@ -31,11 +31,11 @@ pub(super) struct Part {
     pub uvs: Option<Vec<Vec2>>,
     /// Of the UV atlas, where these are others.
     pub atlas_uvs: Option<Vec<Vec2>>,
-    /// Of each field that is asked for, its numbers.
+    /// The numbers of each requested field.
     pub fields: Vec<Vec<f32>>,
     /// Bone indices (into the skin) and weights.
     pub influences: Option<Vec<Influence>>,
-    /// Colours of its vertices, linear, with alpha; where they are asked for.
+    /// Colours of its vertices, linear, with alpha; where they are requested.
     pub colors: Option<Vec<[f32; 4]>>,
     pub triangles: Vec<[u32; 3]>,
     pub targets: Vec<Target>,
@@ -85,7 +85,7 @@ impl Mended {
 
 impl Document {
     /// Read a primitive; none when it is of points or lines. `bones` is the number of bones of its
-    /// node's skin, where there is one and it is asked for.
+    /// node's skin, where there is one and it is requested.
     pub(super) fn part(
         &self,
         primitive: &Primitive,
@@ -227,7 +227,7 @@ impl Document {
         }
     }
 
-    /// What fields are asked for, from the attributes of their names: `_CURVATURE` of the field `curvature`. A part that
+    /// The requested fields, from the attributes of their names: `_CURVATURE` of the field `curvature`. A part that
     /// lacks one has what stands in for it.
     fn fields(
         &self,

@@ -1,14 +1,14 @@
 //! Forward-mode derivatives of the rules, made from their own WGSL.
 //!
 //! A rule is a function from quantities to quantities; its *tangent* is the directional derivative: a
-//! function of the same arguments and of their tangents. The rules' text is parsed by `naga`, and each
-//! function that is asked for is written anew with the chain rule applied to every expression, so that
-//! no derivative is kept by hand beside the model that it belongs to. The exceptions are
-//! `rules/tangent/*.wgsl`: taken as they are where the chain rule would be right but inaccurate
-//! (`normalize_or` divides by the largest component), or MODEL 7 asks for another value at a singular
-//! point (`rim_power` at 0, `cube_place_of_unit` of a tiny direction, which `cube_place` may hand it).
+//! function of the same arguments and of their tangents. The rules' text is parsed by `naga`, and each requested
+//! function is written anew with the chain rule applied to every expression, so that no derivative is kept by hand
+//! beside the model that it belongs to. The exceptions are `rules/tangent/*.wgsl`: taken as they are where the chain
+//! rule would be right but inaccurate (`normalize_or` divides by the largest component), or MODEL 7 asks for another
+//! value at a singular point (`rim_power` at 0, `cube_place_of_unit` of a tiny direction, which `cube_place` may hand
+//! it).
 //!
-//! - [`Tangents`]: the functions that were asked for
+//! - [`Tangents`]: the requested functions
 //! - `function`: one function's statements; `expression`: the chain rule; `types`: what moves
 //! - [`chain`]: the chain rule over a plan's steps
 

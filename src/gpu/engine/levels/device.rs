@@ -30,7 +30,7 @@ pub(in crate::engine) struct MadeLevels {
     dilated: bool,
     /// For an environment that is not turned, and for one that is.
     shaders: [LevelShaders; 2],
-    /// The passes of the one that was asked for last.
+    /// The passes of the one that was used last.
     passes: Option<(bool, Vec<Pass>)>,
     levels: Buffer,
     stored: Stored,

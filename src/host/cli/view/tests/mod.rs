@@ -98,7 +98,7 @@ fn until(hand: &mut Hand<'_>, what: &str, done: impl Fn(&Window) -> bool) {
     }
 }
 
-/// Frames until all that was asked for is there.
+/// Frames until every request is answered.
 fn settle(hand: &mut Hand<'_>) {
     for _ in 0..3 {
         until(hand, "the window is complete", |window| window.session.is_idle());
