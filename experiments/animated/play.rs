@@ -100,7 +100,7 @@ impl Player<'_> {
         }))
     }
 
-    /// So many frames, with some on their way while the next pose is computed; and the seconds that they took together.
+    /// `frames` frames, with some on their way while the next pose is computed; and the seconds that they took together.
     fn in_flight(
         &mut self,
         gpu: &Gpu,

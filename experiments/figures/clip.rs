@@ -126,7 +126,7 @@ impl Clip {
         Ok(bakes[from].between(&bakes[to], share).ok_or("two bakes are not of one mesh")?)
     }
 
-    /// So many numbers of each vertex: those of the skin's.
+    /// Of `all`, which has `numbers` numbers of each vertex, those of the skin's.
     pub(crate) fn of_skin(&self, all: &[f32], numbers: usize) -> Vec<f32> {
         self.skin.iter().flat_map(|&vertex| &all[numbers * vertex..numbers * (vertex + 1)]).copied().collect()
     }

@@ -256,9 +256,9 @@ struct Style {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Digits {
-    /// So many after the point.
+    /// Digits after the point.
     Decimals(usize),
-    /// So many that are significant; by powers of ten where the number is small.
+    /// Significant digits; by powers of ten where the number is very small or very large.
     Significant(usize),
 }
 
@@ -304,7 +304,7 @@ impl Style {
     }
 }
 
-/// So many digits of a number.
+/// `digits` significant digits of a number.
 pub(crate) fn significant(number: f64, digits: usize) -> String {
     let scientific = format!("{number:.*e}", digits - 1);
     let (mantissa, exponent) = scientific.split_once('e').unwrap_or((&scientific, "0"));

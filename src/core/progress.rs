@@ -13,7 +13,7 @@ pub trait Progress: Send + Sync {
 
 /// Is told of one piece of work, by any of its threads; dropped when the work ends.
 pub trait Steps: Send + Sync {
-    /// So many more steps are done.
+    /// `steps` more steps are done.
     fn advance(&self, steps: u64);
     /// What is being done now, in a few words.
     fn describe(&self, _words: &str) {}
@@ -42,7 +42,7 @@ pub fn bar(name: &'static str, steps: u64) -> Work {
 }
 
 impl Work {
-    /// So many more steps are done.
+    /// `steps` more steps are done.
     pub fn inc(&self, steps: u64) {
         if let Some(work) = &self.0 {
             work.advance(steps);

@@ -75,7 +75,7 @@ impl VertexStage {
     }
 }
 
-/// So many workgroups, across and down.
+/// At least `count` workgroups, across and down.
 pub(super) fn groups(count: u32) -> [u32; 2] {
     let across = count.clamp(1, MOST_OF_A_DISPATCH);
     [across, count.div_ceil(across)]

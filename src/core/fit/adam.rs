@@ -15,7 +15,7 @@ const EPSILON: f64 = 1e-8;
 /// The step falls as 1 / (1 + iteration / this), so that it settles at all.
 const COOLING: f64 = 60.0;
 
-/// So many steps in a row without a lower loss end it: far more than the means of gradients remember, and enough for
+/// Steps in a row without a lower loss that end it: far more than the means of gradients remember, and enough for
 /// cooling to shorten the first steps to a quarter.
 const IDLE: u32 = 200;
 

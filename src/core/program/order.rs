@@ -186,8 +186,8 @@ impl<'a> Order<'a> {
 mod tests {
     use super::*;
 
-    /// So many chains: a number is loaded, goes through some steps, and each of these has a slope that is an output, the
-    /// values standing before the slopes.
+    /// `count` chains: a number is loaded, goes through `length` steps, and each of these has a slope that is an output,
+    /// the values standing before the slopes.
     fn chains(count: usize, length: usize) -> Dependencies {
         let mut steps = Dependencies::default();
         let mut numbers = 0;

@@ -374,7 +374,7 @@ fn of_skin(
     (samples, hits.plain)
 }
 
-/// So many records of what the effects of `scene` ask for, all zero.
+/// `count` records of what the effects of `scene` ask for, all zero.
 #[must_use]
 pub fn asked_records(scene: &Scene, count: usize) -> SurfaceRecords {
     SurfaceRecords::new(surface::asked_of(scene), count)

@@ -149,8 +149,8 @@ impl<'a> PosedSurface<'a> {
         field.name() != NORMAL_SPREAD && self.lobes.as_ref().is_none_or(|lobes| !lobes.finds(field))
     }
 
-    /// What there is of a field at each vertex, its numbers one after the other; a vertex that is of no triangle has what
-    /// stands in for them. All cores.
+    /// A field's numbers at each vertex, one vertex after the other; a vertex that is of no triangle has what stands in
+    /// for them. All cores.
     #[must_use]
     pub fn field_of_vertices(&self, field: Field) -> Vec<f32> {
         let FieldInfo { numbers: count, neutral, .. } = *field.info();
@@ -165,7 +165,7 @@ impl<'a> PosedSurface<'a> {
         numbers
     }
 
-    /// What there is of a field at each of the points, a row for each of its numbers.
+    /// A field's numbers at each of the points, a row each.
     pub(super) fn field_of_each(&self, field: Field, points: &Points, rows: &mut [Row]) {
         match self.supplies.iter().find(|(of, _)| *of == field) {
             Some((_, supply)) => supply.find_each(points, rows),
@@ -173,7 +173,7 @@ impl<'a> PosedSurface<'a> {
         }
     }
 
-    /// What there is of a field at a point; what stands in for it where nothing has it.
+    /// A field's numbers at a point; what stands in for them where nothing has the field.
     pub(super) fn field(&self, field: Field, hit: Hit, numbers: &mut [f32]) {
         if let Some((_, supply)) = self.supplies.iter().find(|(of, _)| *of == field) {
             return supply.find(hit, numbers);

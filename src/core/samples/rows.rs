@@ -42,7 +42,7 @@ impl DerefMut for Row {
     }
 }
 
-/// So many rows, all zero. All cores: fresh memory is handed out page by page.
+/// `count` rows, all zero. All cores: fresh memory is handed out page by page.
 #[must_use]
 pub fn zeros(count: usize) -> Vec<Row> {
     (0..count).into_par_iter().with_min_len(1 << 12).map(|_| Row::ZERO).collect()

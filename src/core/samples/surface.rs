@@ -160,7 +160,7 @@ impl<'a> Surface<'a> {
         self.mesh.triangles[hit.triangle as usize].map(|i| i as usize)
     }
 
-    /// What there is of a field at each of the points, a row for each of its numbers.
+    /// A field's numbers at each of the points, a row each.
     pub(super) fn field(&self, field: Field, points: &Points, rows: &mut [Row]) {
         if field.map().is_some() {
             return put_each(points, rows, |hit, numbers| {

@@ -85,7 +85,7 @@ impl Supply for Through<'_> {
 }
 
 impl Through<'_> {
-    /// What there is at each of at most [`LANES`] points.
+    /// The field's number at each of at most [`LANES`] points.
     fn found(&self, hits: &[Hit]) -> [f32; LANES] {
         let attenuation = |hit: &Hit| self.light.attenuation(self.inside.position(*hit)) as f32;
         let each = |of: &dyn Fn(usize) -> f32| {

@@ -49,7 +49,7 @@ pub struct Places {
     discs: OnceCell<Vec<[Disc; LANES]>>,
 }
 
-/// What there is of a light from a place.
+/// How the visible share of a light is found from a place.
 #[derive(Clone, Copy)]
 enum Aim {
     /// The share that is visible.

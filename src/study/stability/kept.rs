@@ -176,7 +176,7 @@ fn case(source: &Source, table: CaseTable<Spanned<String>>) -> Result<KeptCase, 
     Ok(KeptCase { name: name.clone(), batch: Batch { setting, fragments } })
 }
 
-/// So many numbers of a fragment come first and are of its texel.
+/// Numbers of a fragment that come first and are of its texel.
 const TEXEL: usize = 3;
 
 /// What was found, as the text of a file that [`read`] takes.

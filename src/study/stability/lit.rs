@@ -58,8 +58,8 @@ pub fn search(
     tallies.into_iter().map(|(tally, _)| tally).collect()
 }
 
-/// So many batches on every engine, as many `together` as are held at once; `progress` is told after each. Of each evaluator
-/// how it did, and the first batch that failed.
+/// `count` batches on every engine, at most `together` of them held at once; `progress` is told after each. Of each
+/// evaluator how it did, and the first batch that failed.
 pub(super) fn tallied(
     evaluators: &Evaluators,
     (count, together): (usize, usize),

@@ -108,7 +108,7 @@ fn an_interrupted_fit_keeps_its_state_and_goes_on_to_the_same_end() {
     assert_eq!(evaluations("run"), evaluations("whole"));
 }
 
-/// So many rays that tracing them lasts for seconds.
+/// A sandbox whose scene has rays enough for tracing them to last for seconds.
 #[cfg(unix)]
 fn slow_bakes() -> Sandbox {
     let sandbox = Sandbox::new();

@@ -56,7 +56,7 @@ impl Random {
         (self.0 >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// So many numbers of f32 between two.
+    /// `count` numbers of f32 between `low` and `high`.
     pub(super) fn list(&mut self, count: usize, low: f64, high: f64) -> Vec<f64> {
         (0..count).map(|_| f64::from((low + (high - low) * self.next()) as f32)).collect()
     }

@@ -9,7 +9,7 @@ use super::streams::Column;
 use crate::samples::LANES;
 use crate::samples::rows::Row;
 
-/// Rows of a register: so many that dispatch costs little, so few that registers stay in the nearest cache.
+/// Rows of a register: enough for dispatch to cost little, few enough for registers to stay in the nearest cache.
 pub(super) const WIDTH: usize = 4;
 
 /// The rows of a register.

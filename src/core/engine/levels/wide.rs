@@ -143,7 +143,7 @@ impl<S: Simd, const N: usize> Wide<f64, S> for Batch<f64, N> {
     }
 }
 
-/// So many numbers from a place on. Behind the last texel's stand those that mean nothing.
+/// `N` numbers from `at` on. Behind the last texel's stand those that mean nothing.
 #[inline(always)]
 fn several<R, const N: usize>(numbers: &[R], at: usize) -> &[R; N] {
     match numbers[at..at + N].first_chunk() {

@@ -18,8 +18,8 @@ const WHOLE: f32 = 0.999;
 /// Least root mean squares by which differences are weighed: a coverage of 16 samples is off by so much at a border, and
 /// so are colours of what is hardly textured.
 const LEAST: f64 = 0.02;
-/// Colours that differ do so over whole regions: of each kind's weight the colours' is lessened by this, as so many
-/// pixels side by side say the same.
+/// Colours that differ do so over whole regions: of each kind's weight the colours' is lessened by this, because
+/// many pixels side by side say the same.
 const ALIKE: f64 = 0.25;
 
 /// Pixels to each side over which the mean is left out: wider, it is the shading's mistakes that are compared, which a

@@ -1,7 +1,7 @@
 //! How a pass reads a pixel: its samples, its target and its weight.
 //!
 //! Where each pixel has one sample, a thread asks for its next pixel before it shades the present one: a processor
-//! holds so few threads beside so many sums that they would wait for memory together (a thirtieth to a twentieth of
+//! holds so few threads beside all the sums that they would wait for memory together (a thirtieth to a twentieth of
 //! a pass, on an H200).
 
 use std::fmt::Write as _;

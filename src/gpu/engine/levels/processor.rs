@@ -81,7 +81,7 @@ impl UploadedLevels {
     }
 }
 
-/// So many records of `stride` rows, with rows of 0 up to `wanted`.
+/// `records` records of `stride` rows, with rows of 0 up to `wanted`.
 fn padded(rows: Vec<Row>, stride: usize, wanted: usize, records: usize) -> Vec<Row> {
     if stride == wanted {
         return rows;
