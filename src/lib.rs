@@ -55,7 +55,8 @@
 //! for one text, another text under it is an error, and there may be 1,024 effects in all.
 //!
 //! What stands here are a few names of the members of the workspace, which follow the data's one way: `skinfit_core`
-//! (everything on the CPU), `skinfit_gpu` (the renderer and the engine on an adapter),
+//! (engine, solvers, images and exports on the CPU, and under their names the modules of what stands before it: model, scenes,
+//! bakes, samples), `skinfit_gpu` (the renderer and the engine on an adapter),
 //! `skinfit_tensor`, `skinfit_report` (metrics, pictures and pages), `skinfit_study`, and `skinfit_host`, the command
 //! line. The types and functions at the root are kept from version to version, and so are those that the table above takes from modules.
 //! **Nothing else of the modules is**: they are the members' own, for whoever needs more, as some of the examples do, and

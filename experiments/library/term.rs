@@ -12,7 +12,7 @@ use skinfit::model::params::Column;
 use skinfit::prepare::Loaded;
 use skinfit::samples::ViewSamples;
 use skinfit::scene::view::{Target, View};
-use skinfit::shader::{Budget, Facts};
+use skinfit::shader::Budget;
 use skinfit::{FitOptions, PrepareOptions, Shader, built_in_scene, fit, register_term};
 
 /// What the images are made with.
@@ -53,7 +53,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("{}: {:.4?} of {WEIGHT:?}", weight.name(), found.0);
     println!("{}: {:.4} of {F0}", f0.name(), found.1);
 
-    let facts = Facts::of_scene(&observed.scene, &outcome.end.params, Budget::Within(0.05), false);
+    let facts = observed.scene.facts(&outcome.end.params, Budget::Within(0.05), false);
     let text = export::function(export::Target::Glsl, &facts, &outcome.end.params, &Provenance::default())?;
     std::fs::write("library_term.glsl", text)?;
     println!("the shader: library_term.glsl");

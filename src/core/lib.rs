@@ -1,40 +1,32 @@
-//! skinfit's library: from a scene to fitted constants, images and shaders, on the CPU.
+//! The front of all that runs on the CPU: engine, solvers, images, exports; and, under their names, the modules of the members
+//! before it.
 //!
 //! Data flows one way through the modules, as `docs/architecture.md` draws it:
 //!
-//! - [`model`]: what the rules of *Skin in the "Dawn" Demo* (GPU Gems, chapter 3) are about: the parameter table,
-//!   effects, terms, cubes, kinds of numbers. Knows nothing of files or meshes.
-//! - [`scene`]: scene files, meshes, maps, cameras: everything that is read.
-//! - [`builtin`]: the scene that the program makes by itself.
-//! - [`bake`]: environment to cube maps and spherical harmonics, ambient occlusion and transfer, and their cache.
-//! - [`samples`]: the visible surface of each view, as records of sixteen pixels.
+//! - [`prepare`]: the stages up to the samples, run once and timed.
 //! - [`engine`]: loss, gradient and normal equations over samples.
 //! - [`fit`]: the solvers, and what is known of the answer afterwards.
 //! - [`render`]: images from samples, and image files.
-//! - [`prepare`]: the stages up to the samples, run once and timed.
-//! - [`demo`]: the built-in scene as files, its targets rendered.
-//! - [`shader`]: the model's formulas as rules in WGSL, and the planner that makes shaders of them.
-//! - [`program`]: planned rules as arithmetic on numbers, for the processor.
 //! - [`export`]: constants and shaders as text for other engines.
-//! - [`specular`]: the specular BRDFs in f64, their integrals, and the rational functions that the rules take for these.
-//! - [`files`], [`output`], [`progress`], [`simd`]: files read from disk or memory; written whole or not at all; who is told how far long work is; which
-//!   SIMD instructions there are.
+//! - [`demo`]: the built-in scene as files, its targets rendered.
+//!
+//! What stands before them: the model ([`skinfit_rules`]), scenes ([`skinfit_scene`]), the head that the program makes
+//! ([`skinfit_builtin`]), bakes and samples ([`skinfit_sampling`]).
 
-pub mod bake;
-pub mod builtin;
+#[doc(no_inline)]
+pub use skinfit_base::{files, output, progress, simd, with_simd};
+#[doc(no_inline)]
+pub use skinfit_builtin as builtin;
+#[doc(no_inline)]
+pub use skinfit_rules::{model, program, shader, specular};
+#[doc(no_inline)]
+pub use skinfit_sampling::{bake, samples};
+#[doc(no_inline)]
+pub use skinfit_scene as scene;
+
 pub mod demo;
 pub mod engine;
 pub mod export;
-pub mod files;
 pub mod fit;
-pub mod model;
-pub mod output;
 pub mod prepare;
-pub mod program;
-pub mod progress;
 pub mod render;
-pub mod samples;
-pub mod scene;
-pub mod shader;
-pub mod simd;
-pub mod specular;

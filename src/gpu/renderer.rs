@@ -119,7 +119,7 @@ impl Renderer {
         let morph_weights = targets.iter().map(|&i| morphs[i].weight).collect();
         let facts = Facts {
             morphs: targets.len() as u32,
-            ..Facts::of_scene(&content.scene, &content.params, options.budget, gpu.f16())
+            ..content.scene.facts(&content.params, options.budget, gpu.f16())
         };
         let mut uploads = Uploads::new(gpu, content, targets)?;
         let plain = Plain::new(gpu, &facts, &mut uploads)?;

@@ -9,7 +9,7 @@ use crate::model::diffusion::{Method, Seams};
 use crate::model::effects::Effect;
 use crate::model::params::Params;
 use crate::prepare::{Baked, JointScene, JointScenes};
-use crate::shader::{Budget, Facts, plan};
+use crate::shader::{Budget, plan};
 
 /// A cube lookup reads 2 x 2 texels of four 32-bit channels.
 const LOOKUP_BYTES: usize = 4 * 4 * size_of::<f32>();
@@ -43,7 +43,7 @@ impl Counts {
 
     fn of_scene(scenes: &JointScenes, part: &JointScene, params: &Params) -> Result<Self, StudyError> {
         let scene = &part.baked.scene;
-        let mut facts = Facts::of_scene(scene, params, Budget::Exact, false);
+        let mut facts = scene.facts(params, Budget::Exact, false);
         // Told of what an adapter can draw, which the others are measured against.
         let diffusion = &mut facts.setup.choices.diffusion;
         (diffusion.method, diffusion.seams) = (Method::Separable, Seams::Cut);

@@ -211,7 +211,7 @@ fn numbers_of_any_size_reach_the_image_through_the_hardwares_filters_too() {
 #[test]
 fn an_export_declares_them_and_says_what_they_are() {
     let baked = baked(&weighted(OWN, ""));
-    let scene = Facts::of_scene(&baked.scene, &baked.scene.params, Budget::Paper, false);
+    let scene = baked.scene.facts(&baked.scene.params, Budget::Paper, false);
     let of_engine = Facts { setup: baked.setup(), ..crate::exports::engine_facts() };
     let facts = Facts { maps: MapFacts { own: scene.maps.own, ..of_engine.maps }, ..of_engine };
     let text = crate::exports::compiled_glsl("freckles", &facts);

@@ -92,13 +92,13 @@ fn lit() -> &'static Term {
 fn veined() -> &'static Term {
     static TERM: OnceLock<&'static Term> = OnceLock::new();
     let text =
-        include_str!("../../src/core/shader/atlas/tests/stretched.wgsl").replace("NAME", "veins") + VEINED;
+        include_str!("../../src/rules/shader/atlas/tests/stretched.wgsl").replace("NAME", "veins") + VEINED;
     TERM.get_or_init(|| register("veins", &text).unwrap_or_else(|error| panic!("{error}")))
 }
 
 fn term() -> &'static Term {
     static TERM: OnceLock<&'static Term> = OnceLock::new();
-    let text = include_str!("../../src/core/shader/atlas/tests/hills.wgsl");
+    let text = include_str!("../../src/rules/shader/atlas/tests/hills.wgsl");
     let text = text.replace("NAME", "glow").replace("HILLS", "12.0") + GLOW;
     TERM.get_or_init(|| register("glow", &text).unwrap_or_else(|error| panic!("{error}")))
 }
@@ -253,7 +253,7 @@ fn levels_move_as_their_differences_do() {
     let veined = veined();
     let mut scene = scene();
     scene.effects = Effects::of(&[veined.effect]);
-    let facts = Facts { atlas: Some(64), ..Facts::of_scene(&scene, &scene.params, Budget::Exact, false) };
+    let facts = Facts { atlas: Some(64), ..scene.facts(&scene.params, Budget::Exact, false) };
     let planned = plan(&facts).unwrap();
     let levels = |plan: &Plan, scene: &Scene| skinfit::gpu::atlas::levels(gpu, plan, content(scene)).unwrap();
     // The square's side over the texels that it covers: rounded at most by what 1e-7 is of a texel's 1e-2.
@@ -505,7 +505,7 @@ mod over_stored_texels {
         let Some(gpu) = gpu() else { return };
         let mut scene = both();
         scene.params = truth(&scene).params;
-        let facts = Facts::of_scene(&scene, &scene.params, Budget::Exact, false);
+        let facts = scene.facts(&scene.params, Budget::Exact, false);
         let drawn_levels = skinfit::gpu::atlas::levels(gpu, &plan(&facts).unwrap(), content(&scene)).unwrap();
         let atlas = atlas(&scene, None);
         let facts = Facts::of_samples(scene.setup(), FaceSizes::default(), false);
@@ -547,7 +547,7 @@ mod over_stored_texels {
         let effects = Effects::of(&[lit().effect, Effect::NormalMap, Effect::Occlusion]);
         let head = baked(&built_in(), effects, 96);
         let (scene, params) = (Arc::clone(&head.scene), &head.scene.params);
-        let facts = Facts::of_scene(&scene, params, Budget::Exact, false);
+        let facts = scene.facts(params, Budget::Exact, false);
         let drawn_levels =
             skinfit::gpu::atlas::levels(gpu, &plan(&facts).unwrap(), Content::of(&head)).unwrap();
         let atlas = atlas(&scene, head.occlusion.as_deref());

@@ -379,6 +379,33 @@ fn small_scene() -> Scene {
     scene
 }
 
+#[test]
+fn a_finer_hilite_cube_holds_what_a_halved_panorama_has_lost() {
+    // One bright texel, straight ahead.
+    let (width, height) = (4096, 2048);
+    let mut texels = vec![[0.0; 3]; width * height];
+    texels[height / 2 * width + width / 2] = [1.0; 3];
+    let environment = Environment {
+        panorama: Map { width, height, texels },
+        rotation_degrees: 0.0,
+        intensity: 1.0,
+        spots: Spots::default(),
+    };
+    let effects = Effects::of(&[Effect::Hilite]);
+    let mut scene = Scene { environment: Some(environment), ..bare_scene(effects) };
+    let mut brightest = |size: u32| {
+        scene.quality.hilite_size = size;
+        let light = bake(&scene, &triangle, &within(32.0..=32.0), None).unwrap().0.illumination;
+        let cube = light.hilite.unwrap();
+        let size = size as usize;
+        let texel = |i: usize| cube.texel(i / (size * size), i % size, i / size % size)[0];
+        (0..6 * size * size).map(texel).fold(0.0, f32::max)
+    };
+    let (coarse, fine) = (brightest(512), brightest(1024));
+    // Half as wide, the panorama's brightest texel is a quarter, whatever is made of it.
+    assert!(coarse <= 0.25 && fine > 0.3, "{coarse} at 512 texels a side, {fine} at 1024");
+}
+
 fn triangle(_: &[f32]) -> PosedMesh {
     PosedMesh {
         positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],

@@ -10,7 +10,7 @@ use skinfit::model::params::{Column, Param};
 use skinfit::prepare::Baked;
 use skinfit::render::image::Image;
 use skinfit::shader::atlas::{Pass, PassKind};
-use skinfit::shader::{Budget, Facts, plan};
+use skinfit::shader::{Budget, plan};
 
 use crate::graphics::bench::{EXACT, gpu};
 use crate::sky::{brighter, effect, head_with, on_cpu};
@@ -123,7 +123,7 @@ fn the_sum_alone_is_looked_up() {
     for five in [false, true] {
         let looked_up = |combined| {
             let baked = head(combined, Unblurred::Map, five, 16);
-            let facts = Facts::of_scene(&baked.scene, &baked.scene.params, Budget::Exact, false);
+            let facts = baked.scene.facts(&baked.scene.params, Budget::Exact, false);
             let plan = plan(&facts).unwrap();
             let draws: Vec<&Pass> = plan.passes.iter().filter(|pass| pass.kind == PassKind::Draw).collect();
             (plan.levels.len(), draws.len(), draws.last().unwrap().plan.levels.len())

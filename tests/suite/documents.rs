@@ -32,7 +32,7 @@ fn the_page_of_parameters_holds_the_programs_table() {
     assert!(page.starts_with("# Parameters\n"), "the page says nothing before its table");
     assert!(
         page.ends_with(&table),
-        "docs/parameters.md has drifted from the table in src/core/model/params.rs"
+        "docs/parameters.md has drifted from the table in src/rules/model/params.rs"
     );
 }
 

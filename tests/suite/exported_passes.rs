@@ -73,7 +73,7 @@ fn choices() -> [Named; 6] {
 
 /// What `skinfit export` calls for.
 fn engine_facts(baked: &Baked) -> Facts {
-    let facts = Facts::of_scene(&baked.scene, &baked.scene.params, export::BUDGET, false);
+    let facts = baked.scene.facts(&baked.scene.params, export::BUDGET, false);
     Facts { tessellation: 1.0, shadows: None, ..facts }
 }
 

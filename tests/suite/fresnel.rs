@@ -303,7 +303,7 @@ fn a_lobe_that_goes_by_an_occlusion_which_is_off_is_told() {
 fn exports_hold_the_lobe() {
     for (choices, share) in [(CHOICES[1], "share_of_ggx"), (CHOICES[2], "dielectric_share_of_ggx")] {
         let scene = baked(&scene(choices, PARAMS)).scene;
-        let facts = Facts::of_scene(&scene, &scene.params, Budget::Paper, false);
+        let facts = scene.facts(&scene.params, Budget::Paper, false);
         let facts = Facts { setup: facts.setup, ..crate::exports::engine_facts() };
         let text = crate::exports::compiled_glsl(share, &facts);
         assert!(text.contains(&format!("skinfit_{share}(")) && text.contains("ROUGHNESS"), "{text}");

@@ -17,11 +17,11 @@ use super::vectors::reader::{Node, Vectors};
 
 /// What the rules see of a vertex: V, S.z, its square, and S.w.
 const SIGHT: [&str; 5] = [
-    include_str!("../../src/core/shader/rules/lib/vector.wgsl"),
-    include_str!("../../src/core/shader/rules/vertex/vertex_view.wgsl"),
-    include_str!("../../src/core/shader/rules/vertex/vertex_silhouette.wgsl"),
-    include_str!("../../src/core/shader/rules/vertex/vertex_rim_squared.wgsl"),
-    include_str!("../../src/core/shader/rules/fragment/dapple_cosine.wgsl"),
+    include_str!("../../src/rules/shader/rules/lib/vector.wgsl"),
+    include_str!("../../src/rules/shader/rules/vertex/vertex_view.wgsl"),
+    include_str!("../../src/rules/shader/rules/vertex/vertex_silhouette.wgsl"),
+    include_str!("../../src/rules/shader/rules/vertex/vertex_rim_squared.wgsl"),
+    include_str!("../../src/rules/shader/rules/fragment/dapple_cosine.wgsl"),
 ];
 
 /// Every output of listing 3-3 for a vector file's inputs, evaluated in `R`: the vertex as meshes are posed, and the

@@ -327,7 +327,7 @@ fn lights_that_stand_somewhere_are_refused() {
     let folder = quad("\"diffuse\", \"lights\"", "");
     let options = LoadOptions { targets: false, ..LoadOptions::default() };
     let (scene, _) = Scene::load(&folder.path("scene.toml"), &options).unwrap();
-    let facts = Facts { tessellation: 1.0, ..Facts::of_scene(&scene, &scene.params, export::BUDGET, false) };
+    let facts = Facts { tessellation: 1.0, ..scene.facts(&scene.params, export::BUDGET, false) };
     let error = export::material(Target::Unreal, &facts, &scene.params, "Skin").unwrap_err().to_string();
     assert!(error.contains("places in the scene (light_lamp_"), "{error}");
     assert!(error.contains("which no material file hands over"), "{error}");

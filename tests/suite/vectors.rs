@@ -189,8 +189,8 @@ fn fragment_at<R: Real>(form: Form, inputs: &Node<'_>, like: R) -> Fragment<R> {
 
 /// The rules' power, and how it moves.
 const RIM: [&str; 2] = [
-    include_str!("../../src/core/shader/rules/lib/rim.wgsl"),
-    include_str!("../../src/core/shader/rules/tangent/rim_power.wgsl"),
+    include_str!("../../src/rules/shader/rules/lib/rim.wgsl"),
+    include_str!("../../src/rules/shader/rules/tangent/rim_power.wgsl"),
 ];
 
 fn fragment_vector<R: Number>(vectors: &Vectors, file: &Node<'_>, like: R) {

@@ -33,7 +33,7 @@ use super::upload::{Content, Uploads};
 use crate::samples::covered::{Covered, SampleMask};
 use crate::samples::surface_records::Places;
 use crate::scene::view::Camera;
-use crate::shader::{Budget, Facts};
+use crate::shader::Budget;
 
 /// The most samples of a tile: 36 bytes each are 300 MB.
 const MOST_SAMPLES: u64 = 1 << 23;
@@ -63,7 +63,7 @@ impl Geometry {
         let morphs = &content.scene.mesh.morphs;
         let targets: Vec<usize> = (0..morphs.len()).filter(|&i| morphs[i].weight != 0.0).collect();
         let morph_weights = targets.iter().map(|&i| morphs[i].weight).collect();
-        let facts = Facts::of_scene(&content.scene, &content.params, Budget::Exact, false);
+        let facts = content.scene.facts(&content.params, Budget::Exact, false);
         let mut uploads = if places.corner_shares.is_some() {
             Uploads::by_corner(gpu, content, targets)?
         } else {

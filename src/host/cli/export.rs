@@ -172,7 +172,7 @@ fn tell_foreign(arguments: &Arguments, path: &Path, scene: &Scene, file: &Params
 
 /// What the scene calls for in an engine: maps stay apart, the mesh is not known.
 fn facts(scene: &Scene, file: &ParamsFile) -> Facts {
-    let mut facts = Facts::of_scene(scene, &file.params, export::BUDGET, false);
+    let mut facts = scene.facts(&file.params, export::BUDGET, false);
     facts.maps.color_specular = false;
     facts.maps.normal_attenuator = false;
     facts.tessellation = 1.0;

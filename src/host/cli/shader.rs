@@ -10,7 +10,7 @@ use crate::model::effects::Effects;
 use crate::scene::Scene;
 use crate::scene::load::LoadOptions;
 use crate::shader::atlas::{Axis, Pass, PassKind};
-use crate::shader::{Budget, Domain, Facts, Plan, cited, plan};
+use crate::shader::{Budget, Domain, Plan, cited, plan};
 
 /// Print the shader that a scene gets, and the plan behind it
 #[derive(clap::Args)]
@@ -54,7 +54,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         }
         None => scene.params.clone(),
     };
-    let plan = plan(&Facts::of_scene(&scene, &params, arguments.accuracy, arguments.f16))?;
+    let plan = plan(&scene.facts(&params, arguments.accuracy, arguments.f16))?;
     let text = match arguments.show.as_str() {
         "plan" => table(&plan, ""),
         "wgsl" => modules(&plan),

@@ -13,7 +13,7 @@ use crate::model::gain::Gain;
 use crate::model::params::{Column, Param};
 use crate::prepare::{Baked, Loaded, PrepareOptions, untied};
 use crate::reference::ReferenceView;
-use crate::shader::{Budget, Facts, plan};
+use crate::shader::{Budget, plan};
 use crate::subject::Subject;
 
 /// Most folds: one for each view, or for each part of the views where there are more.
@@ -69,7 +69,7 @@ impl Judge<'_> {
             }
         }
         let scene = &baked.scene;
-        let planned = plan(&Facts::of_scene(scene, &scene.params, Budget::Exact, false))?;
+        let planned = plan(&scene.facts(&scene.params, Budget::Exact, false))?;
         let mean = scores.iter().sum::<f64>() / scores.len().max(1) as f64;
         Ok((mean, planned.cost))
     }

@@ -10,7 +10,7 @@ use skinfit::model::shadow_filter::ShadowFilter;
 use skinfit::prepare::Baked;
 use skinfit::render::image::Image;
 use skinfit::scene::{LightKind, Scene, ShadowMaps};
-use skinfit::shader::{Budget, Facts, Resource, plan};
+use skinfit::shader::{Budget, Resource, plan};
 
 use super::bench::{EXACT, gpu, on_cpu, on_gpu};
 use crate::exports::provenance;
@@ -233,7 +233,7 @@ fn a_filter_is_the_scenes_choice_within_any_budget_and_no_exports() {
     for budget in [Budget::Exact, Budget::Paper, Budget::Within(1e-4)] {
         for filter in [ShadowFilter::Hardware, ShadowFilter::Pcf, ShadowFilter::Pcss] {
             let scene = with_maps(&baked, |maps| maps.filter = filter).scene;
-            let chosen = plan(&Facts::of_scene(&scene, &scene.params, budget, false)).unwrap();
+            let chosen = plan(&scene.facts(&scene.params, budget, false)).unwrap();
             let steps = chosen.steps.iter().filter(|step| step.rule.uses.contains(&"shadow"));
             let (count, error) = steps.fold((0, 0.0), |(count, sum), step| (count + 1, sum + step.error));
             // One for each light, told with what it is off by.
@@ -250,11 +250,11 @@ fn a_filter_is_the_scenes_choice_within_any_budget_and_no_exports() {
         }
     }
     let vertices = with_maps(&baked, |maps| maps.filter = ShadowFilter::Vertices).scene;
-    let found = plan(&Facts::of_scene(&vertices, &vertices.params, Budget::Exact, false)).unwrap().attributes;
+    let found = plan(&vertices.facts(&vertices.params, Budget::Exact, false)).unwrap().attributes;
     assert_eq!(found.iter().filter(|attribute| attribute.name().ends_with("_open")).count(), 2);
     let text = |filter| {
         let scene = with_maps(&baked, |maps| maps.filter = filter).scene;
-        let facts = Facts::of_scene(&scene, &scene.params, Budget::Within(0.05), false);
+        let facts = scene.facts(&scene.params, Budget::Within(0.05), false);
         export::function(Target::from_name("wgsl").unwrap(), &facts, &scene.params, &provenance()).unwrap()
     };
     let mapped = text(ShadowFilter::Pcf);

@@ -21,7 +21,7 @@ const TOLERANCE: f64 = 1e-5;
 #[derive(clap::Args)]
 #[command(next_help_heading = "Engine")]
 pub(super) struct FitEngineArguments {
-    /// What makes the passes: the CPU, the GPU, or `auto`: a graphics card where there are so many samples
+    /// What makes the passes: the CPU, the GPU, or `auto`: a graphics card where there are enough samples
     /// that opening it pays off.
     #[arg(long, value_name = "ENGINE", default_value = "auto", value_parser = ["auto", "cpu", "gpu"])]
     engine: String,

@@ -138,7 +138,7 @@ def tradeoff(
     """Sweep each approximation, error beside cost (`skinfit tradeoff`).
 
     `axes`: those to sweep, one or several, by default every one; `within`: name the cheapest settings that are off by no
-    more than this share together, as 0.005; `budget`: the most accurate ones that take no longer than so many seconds. The rest as of
+    more than this share together, as 0.005; `budget`: the most accurate ones that take no longer than this number of seconds. The rest as of
     `ablate`. `Study.plots` has a plot for each axis.
     """
     share = None if within is None else f"{100.0 * within:.12g}%"

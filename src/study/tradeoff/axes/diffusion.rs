@@ -29,7 +29,7 @@ fn tapped(scene: &mut Scene, taps: Taps) {
 pub(super) const TAPS: Ways = ways(
     "taps",
     "Places that a blur of the light map counts",
-    "Images with blurs of so many places along each axis; levels by distance over the surface are the reference. Seconds are \
+    "Images with blurs of this number of places along each axis; levels by distance over the surface are the reference. Seconds are \
      those of baking, tracing and one pass, nothing cached.",
     &[
         ("5", |scene| tapped(scene, Taps::Five)),

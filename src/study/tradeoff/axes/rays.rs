@@ -49,7 +49,7 @@ fn swept<'a>(count: &'a dyn Fn(u32) -> f64) -> Swept<'a> {
     Swept {
         axis: Rays.name(),
         title: "Rays a vertex for ambient occlusion",
-        method: "Images with occlusion traced by so many rays. Seconds are those of tracing, nothing cached."
+        method: "Images with occlusion traced by this number of rays. Seconds are those of tracing, nothing cached."
             .to_owned(),
         knob: Knob::OcclusionRays,
         values: &[4, 8, 16, 32, 64, 128, 256, 1024],

@@ -51,7 +51,7 @@ fn swept<'a>(count: &'a dyn Fn(u32) -> f64) -> Swept<'a> {
     Swept {
         axis: Samples.name(),
         title: "Samples along a pixel's side",
-        method: "Images of so many samples a side, n × n a pixel. Seconds are those of tracing the surface and of one pass over it, \
+        method: "Images of this number of samples a side, n × n a pixel. Seconds are those of tracing the surface and of one pass over it, \
                  all views."
             .to_owned(),
         knob: Knob::SamplesPerAxis,

@@ -6,7 +6,7 @@ use crate::model::effects::Silhouette;
 use crate::reference::Difference;
 use crate::render::image::Image;
 use crate::scene::facts::tessellation_error;
-use crate::shader::{Budget, Facts, plan};
+use crate::shader::{Budget, plan};
 use crate::tradeoff::axis::{Choose, Rates, SceneAxis, Setting, Sweep, mark_pareto};
 use crate::tradeoff::bench::Bench;
 use crate::tradeoff::settings::Settings;
@@ -99,7 +99,7 @@ fn setting(
     let evaluated = mesh.evaluated(bench, Settings { silhouette, ..bench.settings() })?;
     let scene = &evaluated.scene;
     let edge = mesh.edge() * scene.metres_per_unit;
-    let facts = Facts::of_scene(scene, &bench.point().params, Budget::Exact, false);
+    let facts = scene.facts(&bench.point().params, Budget::Exact, false);
     let name = match silhouette {
         Silhouette::Vertex => format!("vertex, edges of {:.1} mm", 1e3 * edge),
         _ => silhouette.name().to_owned(),

@@ -79,7 +79,7 @@ impl SceneAxis for SkyLights {
         Ok(Sweep {
             axis: self.name(),
             title: "Lights taken out of the panorama",
-            method: "Images with so many of the panorama's brightest spots as lights; the most are the reference. Seconds are those of \
+            method: "Images with this number of the panorama's brightest spots as lights; the most are the reference. Seconds are those of \
                      baking, tracing and one pass, nothing cached."
                 .to_owned(),
             cost: "seconds",

@@ -42,7 +42,7 @@ impl Axis for Solvers {
             method: format!(
                 "Each solver from the scene's start values on all pixels, {MOST_ITERATIONS} iterations at most. The error is how different \
                  the images of its constants are from those of variable projection. Seconds are those of the fit; the curve shows the loss \
-                 after so many seconds.{}",
+                 after this number of seconds.{}",
                 Fits::words(benches)
             ),
             cost: "seconds",

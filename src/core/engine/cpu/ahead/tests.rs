@@ -17,8 +17,7 @@ use crate::program::graph::Input;
 use crate::program::shading::ShadingError;
 use crate::samples::LANES;
 use crate::samples::rows::Row;
-use crate::scene::light::Light;
-use crate::scene::lit::effect_of;
+use crate::shader::term::{self, LightFamily};
 use crate::simd::{levels, name};
 
 const HEAD: &str = "\
@@ -110,9 +109,9 @@ fn every_tape() -> impl Iterator<Item = (String, Tape)> {
 fn every_tape_by(
     make: fn(&Plan, &Facts) -> Result<Tapes, ShadingError>,
 ) -> impl Iterator<Item = (String, Tape)> {
-    crate::shader::term::library::register_all();
+    term::library::register_all();
     for number in 1..=4 {
-        effect_of(&Light::of_sky(number), true).unwrap();
+        term::light(LightFamily::SkyBeam, &format!("sky_{number}")).unwrap();
     }
     PLANS.iter().flat_map(move |plan| {
         let facts = plan.facts().unwrap();

@@ -94,15 +94,15 @@ fn dunes() -> &'static Term {
 
 fn hills() -> &'static Term {
     static TERM: OnceLock<&'static Term> = OnceLock::new();
-    let text = include_str!("../../../shader/atlas/tests/hills.wgsl");
+    let text = include_str!("../../../../rules/shader/atlas/tests/hills.wgsl");
     let text = text.replace("NAME", "hills").replace("HILLS", "5.0") + HILLS;
     TERM.get_or_init(|| register("hills", &text).unwrap_or_else(|error| panic!("{error}")))
 }
 
 fn furrows() -> &'static Term {
     static TERM: OnceLock<&'static Term> = OnceLock::new();
-    let text =
-        include_str!("../../../shader/atlas/tests/stretched.wgsl").replace("NAME", "furrows") + FURROWS;
+    let text = include_str!("../../../../rules/shader/atlas/tests/stretched.wgsl").replace("NAME", "furrows")
+        + FURROWS;
     TERM.get_or_init(|| register("furrows", &text).unwrap_or_else(|error| panic!("{error}")))
 }
 
