@@ -1,17 +1,20 @@
 //! What stays from pass to pass: the numbers of a sample that no free parameter moves.
 //!
 //! Where such a number meets one that moves, the graph is cut: the number is computed once, kept beside the sample,
-//! and read by later passes like a field. What is cheaper to compute anew than to read is not kept.
+//! and read by later passes like a field; or each pass computes it anew, of other numbers that are kept and of fields:
+//! what takes the least time of all ([`minimum_cut`](crate::minimum_cut)).
 
-use super::graph::{Binary, Graph, Id, Input, Node, Unary};
+use super::graph::{Binary, Graph, Id, Input, Native, Node, Unary};
+use crate::minimum_cut::{Costs, NEVER, cheapest};
 
 /// The name under which kept numbers are read.
 pub const KEPT: &str = "kept";
 
-/// Operations up to which a number of one field is computed anew in each pass.
-const CHEAP: usize = 3;
-/// And of fields that a pass reads anyway.
-const CHEAP_OF_READ: usize = 6;
+/// What a pass spends on sixteen samples to read a field of theirs, in additions: passes over more than the caches hold wait
+/// for memory, from which such a row of 64 bytes comes to a core in some eight nanoseconds.
+const READ: i32 = 24;
+/// And to read a number that is kept, which takes memory beside the fields.
+const READ_KEPT: i32 = 25;
 
 /// A graph in two parts.
 #[derive(Debug)]
@@ -26,61 +29,11 @@ pub struct Cut {
 
 /// Cut off what `outputs` need but does not differ between passes; `moves` says which inputs and lookups do.
 pub fn cut(graph: &Graph, outputs: &[Id], moves: impl Fn(&Graph, Id) -> bool) -> Cut {
-    let live = graph.made_of(&moves);
-    let varies =
-        graph.made_of(|graph, id| matches!(graph.node(id), Node::Field(_)) || graph.looked_up(id).is_some());
-    let looked_up = graph.made_of(|graph, id| graph.looked_up(id).is_some());
-    let reached = graph.reached(outputs);
-    let stays = |id: Id| varies[id.index()] && !live[id.index()];
-    let (mut edge, mut seldom) = (vec![false; graph.len()], vec![false; graph.len()]);
-    for at in (0..graph.len()).map(|at| Id(at as u32)).filter(|id| reached[id.index()]) {
-        if live[at.index()] {
-            // A fallback is asked for so seldom that it is not worth keeping, unless it is a lookup.
-            let first = graph.call_of(at).map_or(usize::MAX, |call| call.native.hot());
-            let last = graph.call_of(at).map_or(0, |call| call.arguments.len());
-            for (k, id) in graph.operands(at).into_iter().enumerate().filter(|&(_, id)| stays(id)) {
-                let fallback = (first..last).contains(&k) && !looked_up[id.index()];
-                (if fallback { &mut seldom } else { &mut edge })[id.index()] = true;
-            }
-        }
-    }
-    outputs.iter().filter(|&&id| stays(id)).for_each(|id| edge[id.index()] = true);
-    // Without lookups of its own a pass need not read samples at all.
-    let looks_up =
-        (0..graph.len()).any(|at| reached[at] && live[at] && graph.looked_up(Id(at as u32)).is_some());
-    // What such a pass reads and computes for its own sake is there for other numbers, too.
-    let mut there = vec![false; graph.len()];
-    let computed = |id: Id, there: &mut [bool]| {
-        let reached = graph.reached(&[id]);
-        reached.iter().zip(there).for_each(|(reached, there)| *there |= reached);
-    };
-    if looks_up {
-        let cheap: Vec<Id> =
-            graph.ids().filter(|id| edge[id.index()] && is_cheap(graph, *id, &varies, &there)).collect();
-        cheap.into_iter().for_each(|id| computed(id, &mut there));
-    }
-    let mut kept = Vec::new();
-    for at in 0..graph.len() {
-        let id = Id(at as u32);
-        if !edge[at] && !seldom[at] {
-            continue;
-        }
-        if !edge[at] || is_cheap(graph, id, &varies, &there) {
-            if looks_up {
-                if edge[at] {
-                    computed(id, &mut there);
-                }
-                continue;
-            }
-            for leaf in leaves(graph, id) {
-                if !kept.contains(&leaf) {
-                    kept.push(leaf);
-                }
-            }
-        } else if !kept.contains(&id) && !is_one_operation_on(graph, id, &kept, &varies) {
-            kept.push(id);
-            there[at] |= looks_up;
-        }
+    let numbers = Numbers::new(graph, moves);
+    let mut kept: Vec<Id> = cheapest(&numbers.met(outputs), |id| numbers.costs(id)).into_iter().collect();
+    if !numbers.looks_up(outputs) {
+        // Without lookups of its own a pass need not read samples at all: what it would read of them is kept as well.
+        kept = numbers.without_fields(outputs, &kept);
     }
     let place = |id: Id| kept.iter().position(|&k| k == id);
     let instead = |id: Id| place(id).map(|component| Input { name: KEPT.to_owned(), component });
@@ -88,41 +41,95 @@ pub fn cut(graph: &Graph, outputs: &[Id], moves: impl Fn(&Graph, Id) -> bool) ->
     Cut { kept, graph: rest, outputs }
 }
 
-/// Whether a number is one operation on numbers that are kept, and on such as do not vary: as cheap to make as to read.
-fn is_one_operation_on(graph: &Graph, id: Id, kept: &[Id], varies: &[bool]) -> bool {
-    let plain = match graph.node(id) {
-        Node::Unary(op, _) => !matches!(op, Unary::Log2 | Unary::Exp2 | Unary::Sqrt | Unary::Reciprocal),
-        Node::Binary(op, ..) => op != Binary::Divide,
-        _ => false,
-    };
-    plain && graph.operands(id).into_iter().all(|operand| !varies[operand.index()] || kept.contains(&operand))
+/// A graph's numbers by what becomes of them.
+struct Numbers<'a> {
+    graph: &'a Graph,
+    /// Made of what differs between passes.
+    live: Vec<bool>,
+    /// Made of what differs between samples.
+    varies: Vec<bool>,
+    /// Made of a lookup.
+    looked_up: Vec<bool>,
 }
 
-/// Whether a number is a field, or a few operations on one, and on what is `there` anyway.
-fn is_cheap(graph: &Graph, id: Id, varies: &[bool], there: &[bool]) -> bool {
-    let (mut fields, mut operations) = (0, 0);
-    let (mut open, mut seen) = (vec![id], vec![false; id.index() + 1]);
-    while let Some(id) = open.pop() {
-        // What all samples share is computed once.
-        if !varies[id.index()] || there[id.index()] || std::mem::replace(&mut seen[id.index()], true) {
-            continue;
-        }
-        match graph.node(id) {
-            Node::Field(_) => fields += 1,
-            Node::Constant(_) | Node::Uniform(_) => {}
-            Node::Call(_) | Node::Part(..) => return false,
-            Node::Unary(..) | Node::Binary(..) | Node::Select { .. } => operations += 1,
-        }
-        open.extend(graph.operands(id));
+impl<'a> Numbers<'a> {
+    fn new(graph: &'a Graph, moves: impl Fn(&Graph, Id) -> bool) -> Self {
+        let looked_up = graph.made_of(|graph, id| graph.looked_up(id).is_some());
+        let varies = graph
+            .made_of(|graph, id| matches!(graph.node(id), Node::Field(_)) || graph.looked_up(id).is_some());
+        Self { graph, live: graph.made_of(moves), varies, looked_up }
     }
-    fields == 0 && operations <= CHEAP_OF_READ || fields <= 1 && operations <= CHEAP
-}
 
-/// The fields that a number is made of.
-fn leaves(graph: &Graph, id: Id) -> Vec<Id> {
-    let reached = graph.reached(&[id]);
-    let ids = (0..=id.index()).filter(|&at| reached[at]).map(|at| Id(at as u32));
-    ids.filter(|&id| matches!(graph.node(id), Node::Field(_))).collect()
+    fn stays(&self, id: Id) -> bool {
+        self.varies[id.index()] && !self.live[id.index()]
+    }
+
+    /// What an operation takes of numbers that stay. A fallback is asked for so seldom that it is not worth keeping, unless
+    /// it is a lookup.
+    fn operands(&self, id: Id) -> Vec<Id> {
+        let first = self.graph.call_of(id).map_or(usize::MAX, |call| call.native.hot());
+        let last = self.graph.call_of(id).map_or(0, |call| call.arguments.len());
+        let of = self.graph.operands(id).into_iter().enumerate();
+        let fallback = |k: usize, id: Id| (first..last).contains(&k) && !self.looked_up[id.index()];
+        of.filter(|&(k, id)| self.stays(id) && !fallback(k, id)).map(|(_, id)| id).collect()
+    }
+
+    /// The numbers that stay and meet what does not, outputs among them.
+    fn met(&self, outputs: &[Id]) -> Vec<Id> {
+        let reached = self.graph.reached(outputs);
+        let live = self.graph.ids().filter(|id| reached[id.index()] && self.live[id.index()]);
+        let mut met: Vec<Id> = live.flat_map(|id| self.operands(id)).collect();
+        met.extend(outputs.iter().filter(|&&id| self.stays(id)));
+        met.sort_unstable();
+        met.dedup();
+        met
+    }
+
+    /// Whether passes look something up.
+    fn looks_up(&self, outputs: &[Id]) -> bool {
+        let reached = self.graph.reached(outputs);
+        self.graph
+            .ids()
+            .any(|id| reached[id.index()] && self.live[id.index()] && self.graph.looked_up(id).is_some())
+    }
+
+    fn costs(&self, id: Id) -> Costs<Id> {
+        // Of a call each part is kept by itself.
+        let kept = if matches!(self.graph.node(id), Node::Call(_)) { NEVER } else { READ_KEPT };
+        Costs { kept, made: self.cost(id), of: self.operands(id) }
+    }
+
+    /// What it costs to have a number in a pass whose operands are there: about as long as processors take.
+    fn cost(&self, id: Id) -> i32 {
+        match self.graph.node(id) {
+            Node::Field(_) => READ,
+            Node::Constant(_) | Node::Uniform(_) | Node::Part(..) => 0,
+            Node::Unary(Unary::Sqrt | Unary::Reciprocal, _) | Node::Binary(Binary::Divide, ..) => 6,
+            Node::Unary(Unary::Exp2 | Unary::Log2, _) => 16,
+            Node::Unary(..) | Node::Binary(..) | Node::Select { .. } => 1,
+            Node::Call(_) => match self.graph.call_of(id).map(|call| call.native) {
+                Some(Native::Lookup(_)) => 200,
+                Some(Native::Unit | Native::Place) | None => 24,
+            },
+        }
+    }
+
+    /// The numbers to keep where `kept` are, and no field is to be read of samples.
+    fn without_fields(&self, outputs: &[Id], kept: &[Id]) -> Vec<Id> {
+        let (mut open, mut seen) = (outputs.to_vec(), vec![false; self.graph.len()]);
+        let mut all = kept.to_vec();
+        while let Some(id) = open.pop() {
+            if kept.contains(&id) || std::mem::replace(&mut seen[id.index()], true) {
+                continue;
+            }
+            if matches!(self.graph.node(id), Node::Field(_)) && self.stays(id) {
+                all.push(id);
+            }
+            open.extend(self.graph.operands(id));
+        }
+        all.sort_unstable();
+        all
+    }
 }
 
 #[cfg(test)]
@@ -173,9 +180,9 @@ mod tests {
     fn what_a_few_operations_make_of_numbers_that_are_read_anyway_is_not_kept() {
         assert_eq!(kept_of(0, false), 0);
         assert_eq!(kept_of(1, false), 0);
-        // Two more fields to read, for each of three numbers; the square takes five operations on them.
-        assert_eq!(kept_of(2, false), 3);
+        // Four more fields to read, for three numbers; the square takes five operations on them.
+        assert_eq!(kept_of(4, false), 3);
         // What a fallback alone would read is not there.
-        assert_eq!(kept_of(2, true), 3);
+        assert_eq!(kept_of(4, true), 3);
     }
 }

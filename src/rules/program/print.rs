@@ -11,6 +11,7 @@ use std::fmt::Write as _;
 use super::cut::KEPT;
 use super::graph::{Binary, Native, Node, Unary};
 use super::tape::{CallOf, Instruction, Mend, Operand, Slot, Tape, Test};
+use crate::shader::quantity::Resource;
 
 /// A tape's instructions as statements, each line indented by `indent`, in which `put` says how an output of that number is
 /// left, by its expression; empty where it says nothing. Also the outputs' expressions.
@@ -33,7 +34,7 @@ pub fn statements(tape: &Tape, indent: &str, put: fn(usize, &str) -> String) -> 
     for (at, instruction) in tape.instructions.iter().enumerate() {
         printer.close(at);
         if ahead.first() == Some(&at) {
-            ahead.iter().for_each(|&lookup| printer.footprint(lookup));
+            (0..ahead.len()).for_each(|k| printer.footprint(&ahead[..=k]));
         }
         printer.instruction(at, instruction, ahead.contains(&at));
         for (k, slot) in tape.outputs.iter().enumerate() {
@@ -129,14 +130,35 @@ impl Printer<'_> {
         }
     }
 
-    /// The texels of a lookup that stands further down.
-    fn footprint(&mut self, at: usize) {
-        if let Instruction::Call(call) = &self.tape.instructions[at]
-            && let Native::Lookup(resource) = call.native
-        {
-            let place = self.slots(&call.arguments);
-            self.line(&format!("let texels{at} = cubes[{resource}].footprint_at({place});"));
-        }
+    /// The texels of the last of these lookups, which stands further down: of faces of one size they are the same.
+    fn footprint(&mut self, lookups: &[usize]) {
+        let [before @ .., at] = lookups else { return };
+        let Some((place, cube)) = self.looked_up(*at) else { return };
+        let alike = |&&other: &&usize| {
+            let there = self.looked_up(other);
+            there.is_some_and(|(other, faces)| other == place && self.sized_alike(faces, cube))
+        };
+        let texels = match before.iter().find(alike) {
+            Some(same) => format!("texels{same}"),
+            None => format!("cubes[{cube}].footprint_at({})", self.slots(place)),
+        };
+        self.line(&format!("let texels{at} = {texels};"));
+    }
+
+    /// The place of a lookup, and which cube it is in.
+    fn looked_up(&self, at: usize) -> Option<(&[Slot], usize)> {
+        let Instruction::Call(call) = &self.tape.instructions[at] else { return None };
+        let Native::Lookup(cube) = call.native else { return None };
+        Some((&call.arguments, cube as usize))
+    }
+
+    fn sized_alike(&self, a: usize, b: usize) -> bool {
+        let faces = |cube: usize| {
+            let name = &self.tape.resources[cube];
+            let known = Resource::BUILT_IN.into_iter().find(|known| known.name() == name);
+            known.map(Resource::sized_as)
+        };
+        a == b || faces(a).is_some() && faces(a) == faces(b)
     }
 
     fn slot(&self, slot: &Slot) -> String {

@@ -80,14 +80,11 @@ impl FaceSizes {
     /// Of a resource's faces.
     #[must_use]
     pub const fn of(&self, resource: Resource) -> Option<usize> {
-        match resource {
+        match resource.sized_as() {
             Resource::IrradianceFaces => self.irradiance,
-            Resource::SpecularFaces | Resource::SpecularSlopeFaces => self.specular,
+            Resource::SpecularFaces => self.specular,
             Resource::HiliteFaces => self.hilite,
-            Resource::ReflectedFaces
-            | Resource::ReflectedSlopeFaces
-            | Resource::GlossyFaces
-            | Resource::GlossySlopeFaces => self.reflected,
+            Resource::ReflectedFaces => self.reflected,
             _ => None,
         }
     }

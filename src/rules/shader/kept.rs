@@ -1,7 +1,8 @@
 //! What is kept of stored samples where no free parameter moves it: then it is all that a pass reads of them.
 //!
-//! Of the built-in effects that is the light of each term before its weights. Of an added one it is the frontier in the
-//! graph of quantities: what the rules that its own parameters move need, and those parameters do not move.
+//! Of the built-in effects that is the light of each term before its weights. Of an added one it is what the rules that its
+//! own parameters move need, and those parameters do not move; or what that is made of, where a pass takes less time to read
+//! that and to compute the rest anew ([`minimum_cut`](crate::minimum_cut)).
 
 use std::collections::BTreeSet;
 
@@ -10,8 +11,14 @@ use super::emit::{Fields, Plan, hazy, parts, sample_fields};
 use super::facts::{Facts, Source};
 use super::quantity::{Constant, Resource};
 use super::rule::Rule;
-use super::search::PlanError;
+use super::search::{PlanError, components};
+use crate::minimum_cut::{Costs, NEVER, cheapest};
 use crate::model::params::Param;
+
+/// What a pass spends to read a number, in operations: what a card computes while as many bytes arrive from its memory.
+const READ: i32 = 16;
+/// What it spends on a lookup.
+const LOOKUP: i32 = 200;
 
 /// What is kept of the built-in effects, with WGSL types.
 const TERMS: [(&str, &str); 10] = [
@@ -100,8 +107,9 @@ fn reads(plan: &Plan, param: Param) -> bool {
         || made.is_some_and(|made| plan.constants.contains(&made))
 }
 
-/// What must be kept beside `kept` so that the sum can be made of what is kept alone: quantities that move with no
-/// parameter but those that `kept` depends on, and are needed by rules that move with another.
+/// What must be kept beside `kept` so that the sum can be made of what is kept alone, at the least cost: of quantities that
+/// move with no parameter but those that `kept` depends on, and are needed by rules that move with another, or what these are
+/// made of.
 fn frontier(facts: &Facts, kept: &Fields) -> Result<Fields, PlanError> {
     let samples = Facts { source: Source::Samples, ..*facts };
     let mut goals = parts(&samples);
@@ -110,38 +118,105 @@ fn frontier(facts: &Facts, kept: &Fields) -> Result<Fields, PlanError> {
     }
     let whole = Plan::search(&samples, &[], &goals, &names(&sample_fields(&samples)))?;
     let still = plan_of(facts, kept)?;
-    let is_held = |constant: Constant| match constant {
-        Constant::Param(param) => reads(&still, param),
-        _ => true,
+    let graph = Quantities::new(&samples, &whole, &still, names(kept));
+    let cut = cheapest(&graph.met(&goals), |thing| graph.costs(thing));
+    let quantity = |thing| match thing {
+        Thing::Quantity(name) => Some((name, graph.kind(name))),
+        Thing::Rule(_) => None,
     };
-    let kept = names(kept);
-    let mut moving: BTreeSet<&'static str> = BTreeSet::new();
-    for rule in whole.rules(Domain::Fragment) {
-        let moves =
-            |name: &str| moving.contains(name) || Constant::from_name(name).is_some_and(|c| !is_held(c));
-        if rule.needs.iter().any(|(name, _)| moves(name)) {
-            moving.extend(rule.gives.iter().map(|(name, _)| *name));
+    Ok(cut.into_iter().filter_map(quantity).collect())
+}
+
+/// What may be kept or made anew.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+enum Thing {
+    Quantity(&'static str),
+    /// A rule, by its place: of several quantities that it gives a pass makes all at once.
+    Rule(usize),
+}
+
+/// The graph of quantities between samples and the sum.
+struct Quantities<'a> {
+    facts: &'a Facts,
+    rules: Vec<&'static Rule>,
+    /// Makes the terms of the built-in effects.
+    still: &'a Plan,
+    /// These terms.
+    terms: Vec<&'static str>,
+    /// What moves with a parameter that does not move them.
+    moving: BTreeSet<&'static str>,
+}
+
+impl<'a> Quantities<'a> {
+    fn new(facts: &'a Facts, whole: &Plan, still: &'a Plan, terms: Vec<&'static str>) -> Self {
+        let rules = whole.rules(Domain::Fragment).collect();
+        let mut graph = Self { facts, rules, still, terms, moving: BTreeSet::new() };
+        for rule in graph.rules.clone() {
+            let moves = |name: &str| {
+                graph.moving.contains(name) || Constant::from_name(name).is_some_and(|c| !graph.is_held(c))
+            };
+            if rule.needs.iter().any(|(name, _)| moves(name)) {
+                graph.moving.extend(rule.gives.iter().map(|(name, _)| *name));
+            }
+        }
+        graph
+    }
+
+    fn is_held(&self, constant: Constant) -> bool {
+        match constant {
+            Constant::Param(param) => reads(self.still, param),
+            _ => true,
         }
     }
-    // What needs nothing is there anyway.
-    let free = |name: &str| {
-        let mut given =
-            whole.rules(Domain::Fragment).filter(|rule| rule.gives.iter().any(|(given, _)| *given == name));
-        given.any(|rule| rule.needs.is_empty() && rule.reads.is_empty())
-    };
-    let moved = |rule: &&Rule| rule.gives.iter().any(|(name, _)| moving.contains(name));
-    // A part that nothing moves is kept as it is.
-    let parts = goals.iter().filter(|goal| !moving.contains(*goal)).map(|goal| (*goal, "vec3f"));
-    let needed = whole.rules(Domain::Fragment).filter(moved).flat_map(|rule| rule.needs.iter().copied());
-    let mut frontier = Fields::new();
-    for (name, kind) in needed.chain(parts) {
-        let constant = Constant::from_name(name).is_some();
-        let there = kept.contains(&name) || frontier.iter().any(|(known, _)| *known == name);
-        if !constant && !there && !moving.contains(name) && !free(name) {
-            frontier.push((name, kind));
+
+    /// Whether a quantity does not move, and is not there anyway.
+    fn stays(&self, name: &str) -> bool {
+        Constant::from_name(name).is_none() && !self.terms.contains(&name) && !self.moving.contains(name)
+    }
+
+    /// What stays and is needed by what moves. A part that nothing moves is kept as it is.
+    fn met(&self, parts: &[&'static str]) -> Vec<Thing> {
+        let moved = |rule: &&&Rule| rule.gives.iter().any(|(name, _)| self.moving.contains(name));
+        let needs = self.rules.iter().filter(moved).flat_map(|rule| &rule.needs).map(|(name, _)| *name);
+        needs.chain(parts.iter().copied()).filter(|name| self.stays(name)).map(Thing::Quantity).collect()
+    }
+
+    fn kind(&self, name: &str) -> &'static str {
+        let mut needs = self.rules.iter().flat_map(|rule| &rule.needs);
+        needs.find(|(needed, _)| *needed == name).map_or("vec3f", |(_, kind)| *kind)
+    }
+
+    fn costs(&self, thing: Thing) -> Costs<Thing> {
+        match thing {
+            Thing::Quantity(name) => {
+                let gives = |rule: &&Rule| rule.gives.iter().any(|(given, _)| *given == name);
+                let by = self.rules.iter().position(gives).map(Thing::Rule);
+                Costs {
+                    kept: READ * components(self.kind(name)) as i32,
+                    // What no rule gives is a field.
+                    made: if by.is_some() { 0 } else { NEVER },
+                    of: by.into_iter().collect(),
+                }
+            }
+            Thing::Rule(at) => {
+                let needs = self.rules[at].needs.iter().map(|(name, _)| *name);
+                let of = needs.filter(|name| self.stays(name)).map(Thing::Quantity).collect();
+                Costs { kept: NEVER, made: self.made(self.rules[at]), of }
+            }
         }
     }
-    Ok(frontier)
+
+    /// What a rule costs in each pass. What reads a parameter that the terms depend on is never made of what is kept.
+    fn made(&self, rule: &Rule) -> i32 {
+        let needs = rule.needs.iter().map(|(name, _)| *name);
+        let constants: Vec<Constant> =
+            needs.chain(rule.reads.iter().copied()).filter_map(Constant::from_name).collect();
+        if constants.into_iter().any(|constant| self.is_held(constant)) {
+            return NEVER;
+        }
+        let lookups = rule.reads.iter().filter(|name| Constant::from_name(name).is_none()).count();
+        rule.cost(self.facts) as i32 + LOOKUP * lookups as i32
+    }
 }
 
 #[cfg(test)]

@@ -225,6 +225,16 @@ impl Resource {
             .chain(mapped.flat_map(|field| [Self::OwnTexels(field), Self::OwnMap(field)]))
     }
 
+    /// Faces that have as many texels: all of a stack have, wherever they stand in it, and their slopes.
+    #[must_use]
+    pub const fn sized_as(self) -> Self {
+        match self {
+            Self::SpecularSlopeFaces => Self::SpecularFaces,
+            Self::ReflectedSlopeFaces | Self::GlossyFaces | Self::GlossySlopeFaces => Self::ReflectedFaces,
+            own => own,
+        }
+    }
+
     /// Those that every scene may have.
     pub const BUILT_IN: [Self; 32] = [
         Self::IrradianceFaces,

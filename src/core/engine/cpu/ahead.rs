@@ -47,9 +47,6 @@ pub(super) struct Plan {
     moving: &'static [Param],
     /// Whether what does not move is kept from pass to pass.
     keeps: bool,
-    /// Whether fits that hold some of `moving`, but free the lobe's width, run it, too: so much moves with that width that
-    /// computing all of it anew takes less than reading what could be kept.
-    serves_held: bool,
 }
 
 const fn plan(
@@ -60,18 +57,7 @@ const fn plan(
     moving: &'static [Param],
 ) -> Plan {
     let choices = Setup::new(form, silhouette, effects).choices;
-    Plan {
-        name,
-        form,
-        silhouette,
-        effects,
-        added: &[],
-        held: &[],
-        choices,
-        moving,
-        keeps: true,
-        serves_held: false,
-    }
+    Plan { name, form, silhouette, effects, added: &[], held: &[], choices, moving, keeps: true }
 }
 
 /// The paper's effects and its haze, as scenes and the race beside other programs have them.
@@ -123,7 +109,7 @@ const STRENGTH_AND_LOBE: &[Param] = &[P::NormalStrength, P::SpecularLobe];
 const ALL_MOVE: &[Param] = &[P::NormalStrength, P::SpecularLobe, P::EnvironmentRotation];
 
 /// The plans, of those with the same effects the ones with less that moves first.
-static PLANS: [Plan; 26] = [
+static PLANS: [Plan; 27] = [
     plan("surface", Corrected, Fragment, Effects::SURFACE, &[]),
     plan("surface_lobe", Corrected, Fragment, Effects::SURFACE, &[P::SpecularLobe]),
     plan("surface_strength", Corrected, Fragment, Effects::SURFACE, &[P::NormalStrength]),
@@ -150,9 +136,10 @@ static PLANS: [Plan; 26] = [
     plan("listing_lobe", Listing, Vertex, Effects::SURFACE, &[P::SpecularLobe]),
     plan("listing_strength", Listing, Vertex, Effects::SURFACE, &[P::NormalStrength]),
     plan("listing_strength_lobe", Listing, Vertex, Effects::SURFACE, STRENGTH_AND_LOBE),
+    plan("lit", Corrected, Fragment, LIT, &[]).with(&LIT_TOO, LIT_BY).holding(&LIT_HELD),
     plan("lit_strength", Corrected, Fragment, LIT, &[P::NormalStrength])
         .with(&LIT_TOO, LIT_BY)
-        .lit(&LIT_HELD),
+        .holding(&LIT_HELD),
 ];
 
 impl Plan {
@@ -160,9 +147,8 @@ impl Plan {
         Self { keeps: false, ..self }
     }
 
-    /// Of lit skin: `held` are not free in it, and fits that hold what moves run it, too.
-    const fn lit(self, held: &'static [&'static str]) -> Self {
-        Self { held, serves_held: true, ..self }
+    const fn holding(self, held: &'static [&'static str]) -> Self {
+        Self { held, ..self }
     }
 
     const fn with(self, added: &'static [&'static str], choices: Choices) -> Self {
@@ -214,8 +200,6 @@ impl Plan {
 pub(super) fn plan_for(fitted: &Fitted, free: &[Param], turned: bool) -> Option<&'static Plan> {
     let effects = ELSEWHERE.into_iter().fold(fitted.setup.effects, Effects::without);
     let setup = Setup { effects, ..fitted.setup };
-    // What moves the lobe's width moves most of what lights show.
-    let widens = free.iter().any(|param| ["roughness", "gloss"].contains(&param.name()));
     let yields = |plan: &&Plan| {
         if plan.setup() != Some(setup) {
             return false;
@@ -224,7 +208,7 @@ pub(super) fn plan_for(fitted: &Fitted, free: &[Param], turned: bool) -> Option<
         plan.keeps == fitted.keep && plan.channels() >= fitted.channels
             && plan.turned() == turned
             // Else lookups would be made anew that could be kept.
-            && (plan.moving.iter().all(|param| free.contains(param)) || plan.serves_held && widens)
+            && plan.moving.iter().all(|param| free.contains(param))
             && free.iter().all(|param| yielded.contains(param))
     };
     PLANS.iter().find(yields)

@@ -183,6 +183,9 @@ impl Writer<'_> {
         if !moving.contains(&true) || !is_float(&self.inner(result)) {
             return Ok(());
         }
+        if self.tangents.has_partials(&function) {
+            return self.by_partials(&called, arguments, result);
+        }
         let Some(tangent) = self.tangents.of(&called, &moving)? else { return Ok(()) };
         let mut given = values;
         for (argument, formal) in arguments.iter().zip(&function.arguments) {
@@ -198,6 +201,33 @@ impl Writer<'_> {
         let name = format!("d{}", result.index());
         let _ = writeln!(self.text, "    let {name} = {}({});", tangent.name, given.join(", "));
         self.moved.insert(result, name);
+        Ok(())
+    }
+}
+
+impl Writer<'_> {
+    /// A call's tangent by partial derivatives: each along 1, so that what is multiplied by it is not, and the same whatever
+    /// moves the arguments, so that all parameters share them.
+    fn by_partials(
+        &mut self,
+        called: &str,
+        arguments: &[Handle<Expression>],
+        result: Handle<Expression>,
+    ) -> Result<(), TangentError> {
+        let values = arguments.iter().map(|&a| self.value(a)).collect::<Result<Vec<_>, _>>()?.join(", ");
+        let mut terms = Vec::new();
+        for (k, &argument) in arguments.iter().enumerate() {
+            let Some(moved) = self.tangent(argument) else { continue };
+            let along: Vec<bool> = (0..arguments.len()).map(|other| other == k).collect();
+            if let Some(partial) = self.tangents.of(called, &along)? {
+                terms.push(format!("{}({values}, 1.0) * {moved}", partial.name));
+            }
+        }
+        if !terms.is_empty() {
+            let name = format!("d{}", result.index());
+            let _ = writeln!(self.text, "    let {name} = {};", terms.join(" + "));
+            self.moved.insert(result, name);
+        }
         Ok(())
     }
 }

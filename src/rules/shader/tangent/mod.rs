@@ -6,7 +6,7 @@
 //! beside the model that it belongs to. The exceptions are `rules/tangent/*.wgsl`: taken as they are where the chain
 //! rule would be right but inaccurate (`normalize_or` divides by the largest component), or MODEL 7 asks for another
 //! value at a singular point (`rim_power` at 0, `cube_place_of_unit` of a tiny direction, which `cube_place` may hand
-//! it).
+//! it). A long function of numbers alone moves by its partial derivatives, which are the same for all parameters.
 //!
 //! - [`Tangents`]: the requested functions
 //! - `function`: one function's statements; `expression`: the chain rule; `types`: what moves
@@ -19,9 +19,9 @@ mod types;
 
 use std::collections::BTreeMap;
 
-use naga::Module;
 use naga::front::wgsl;
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
+use naga::{Function, Module, Scalar, TypeInner};
 
 /// Functions whose tangent is taken as it is, with its text. It takes the arguments, then a tangent for each.
 const BY_HAND: [(&str, &str); 3] = [
@@ -29,6 +29,9 @@ const BY_HAND: [(&str, &str); 3] = [
     ("normalize_or", include_str!("../rules/tangent/normalize_or.wgsl")),
     ("rim_power", include_str!("../rules/tangent/rim_power.wgsl")),
 ];
+
+/// Expressions from which on a function of numbers is worth partial derivatives.
+const LONG: usize = 100;
 
 /// A function that has no tangent.
 #[derive(Clone, Debug, thiserror::Error, PartialEq, Eq)]
@@ -118,6 +121,16 @@ impl Tangents {
         };
         self.written.insert(key, written.clone());
         Ok(written)
+    }
+
+    /// Whether a function is a number made of numbers in many operations, as quotients of polynomials are.
+    fn has_partials(&self, function: &Function) -> bool {
+        let number = |ty| matches!(self.module.types[ty].inner, TypeInner::Scalar(Scalar::F32));
+        let by_hand = BY_HAND.iter().any(|(name, _)| function.name.as_deref() == Some(name));
+        !by_hand
+            && function.expressions.len() >= LONG
+            && function.arguments.iter().all(|argument| number(argument.ty))
+            && function.result.as_ref().is_some_and(|result| number(result.ty))
     }
 
     /// The functions' text, each after those that it calls.

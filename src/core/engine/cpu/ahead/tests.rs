@@ -190,6 +190,8 @@ fn a_plan_moves_the_lookups_that_a_fit_moves() {
     let named = |name| Param::from_name(name).unwrap();
     let of_lobe = [named("roughness"), named("gloss"), named("f0"), P::NormalStrength, P::BaseWeight];
     assert_eq!(plan_for(&fitted, &of_lobe, false).map(|plan| plan.name), Some("lit_strength"));
+    let but_strength = [&of_lobe[..3], &of_lobe[4..]].concat();
+    assert_eq!(plan_for(&fitted, &but_strength, false).map(|plan| plan.name), Some("lit"));
     // What moves with a lamp's colour is not yielded.
     assert!(plan_for(&fitted, &[P::NormalStrength, named("light.sky_1.color")], false).is_none());
 }
