@@ -12,9 +12,17 @@ pub const KEPT: &str = "kept";
 
 /// What a pass spends on sixteen samples to read a field of theirs, in additions: passes over more than the caches hold wait
 /// for memory, from which such a row of 64 bytes comes to a core in some eight nanoseconds.
-const READ: i32 = 24;
+const READ: u64 = 24;
 /// And to read a number that is kept, which takes memory beside the fields.
-const READ_KEPT: i32 = 25;
+const READ_KEPT: u64 = 25;
+/// A quotient or a root.
+const DIVIDE: u64 = 6;
+/// A power or a logarithm.
+const POWER: u64 = 16;
+/// A unit vector, or a place on a cube.
+const UNIT: u64 = 24;
+/// More than to read what it finds, which is four numbers: nothing is looked up anew that stays.
+const LOOKUP: u64 = 200;
 
 /// A graph in two parts.
 #[derive(Debug)]
@@ -29,12 +37,8 @@ pub struct Cut {
 
 /// Cut off what `outputs` need but does not differ between passes; `moves` says which inputs and lookups do.
 pub fn cut(graph: &Graph, outputs: &[Id], moves: impl Fn(&Graph, Id) -> bool) -> Cut {
-    let numbers = Numbers::new(graph, moves);
-    let mut kept: Vec<Id> = cheapest(&numbers.met(outputs), |id| numbers.costs(id)).into_iter().collect();
-    if !numbers.looks_up(outputs) {
-        // Without lookups of its own a pass need not read samples at all: what it would read of them is kept as well.
-        kept = numbers.without_fields(outputs, &kept);
-    }
+    let numbers = Numbers::new(graph, outputs, moves);
+    let kept: Vec<Id> = cheapest(&numbers.met(outputs), |id| numbers.costs(id)).into_iter().collect();
     let place = |id: Id| kept.iter().position(|&k| k == id);
     let instead = |id: Id| place(id).map(|component| Input { name: KEPT.to_owned(), component });
     let (rest, outputs) = graph.rebuilt(outputs, instead);
@@ -50,14 +54,21 @@ struct Numbers<'a> {
     varies: Vec<bool>,
     /// Made of a lookup.
     looked_up: Vec<bool>,
+    /// Whether passes look something up. Without lookups of its own a pass need not read samples at all: what it would read
+    /// of them is kept as well.
+    looks_up: bool,
 }
 
 impl<'a> Numbers<'a> {
-    fn new(graph: &'a Graph, moves: impl Fn(&Graph, Id) -> bool) -> Self {
-        let looked_up = graph.made_of(|graph, id| graph.looked_up(id).is_some());
+    fn new(graph: &'a Graph, outputs: &[Id], moves: impl Fn(&Graph, Id) -> bool) -> Self {
+        let live = graph.made_of(moves);
         let varies = graph
             .made_of(|graph, id| matches!(graph.node(id), Node::Field(_)) || graph.looked_up(id).is_some());
-        Self { graph, live: graph.made_of(moves), varies, looked_up }
+        let looked_up = graph.made_of(|graph, id| graph.looked_up(id).is_some());
+        let reached = graph.reached(outputs);
+        let looks_up =
+            graph.ids().any(|id| reached[id.index()] && live[id.index()] && graph.looked_up(id).is_some());
+        Self { graph, live, varies, looked_up, looks_up }
     }
 
     fn stays(&self, id: Id) -> bool {
@@ -65,13 +76,14 @@ impl<'a> Numbers<'a> {
     }
 
     /// What an operation takes of numbers that stay. A fallback is asked for so seldom that it is not worth keeping, unless
-    /// it is a lookup.
+    /// it is a lookup, or nothing else is read of samples.
     fn operands(&self, id: Id) -> Vec<Id> {
         let first = self.graph.call_of(id).map_or(usize::MAX, |call| call.native.hot());
         let last = self.graph.call_of(id).map_or(0, |call| call.arguments.len());
         let of = self.graph.operands(id).into_iter().enumerate();
-        let fallback = |k: usize, id: Id| (first..last).contains(&k) && !self.looked_up[id.index()];
-        of.filter(|&(k, id)| self.stays(id) && !fallback(k, id)).map(|(_, id)| id).collect()
+        let seldom =
+            |k: usize, id: Id| (first..last).contains(&k) && self.looks_up && !self.looked_up[id.index()];
+        of.filter(|&(k, id)| self.stays(id) && !seldom(k, id)).map(|(_, id)| id).collect()
     }
 
     /// The numbers that stay and meet what does not, outputs among them.
@@ -85,50 +97,26 @@ impl<'a> Numbers<'a> {
         met
     }
 
-    /// Whether passes look something up.
-    fn looks_up(&self, outputs: &[Id]) -> bool {
-        let reached = self.graph.reached(outputs);
-        self.graph
-            .ids()
-            .any(|id| reached[id.index()] && self.live[id.index()] && self.graph.looked_up(id).is_some())
-    }
-
     fn costs(&self, id: Id) -> Costs<Id> {
         // Of a call each part is kept by itself.
         let kept = if matches!(self.graph.node(id), Node::Call(_)) { NEVER } else { READ_KEPT };
-        Costs { kept, made: self.cost(id), of: self.operands(id) }
+        Costs { kept, made: self.made(id), of: self.operands(id) }
     }
 
     /// What it costs to have a number in a pass whose operands are there: about as long as processors take.
-    fn cost(&self, id: Id) -> i32 {
+    fn made(&self, id: Id) -> u64 {
         match self.graph.node(id) {
-            Node::Field(_) => READ,
+            Node::Field(_) if self.looks_up => READ,
+            Node::Field(_) => NEVER,
             Node::Constant(_) | Node::Uniform(_) | Node::Part(..) => 0,
-            Node::Unary(Unary::Sqrt | Unary::Reciprocal, _) | Node::Binary(Binary::Divide, ..) => 6,
-            Node::Unary(Unary::Exp2 | Unary::Log2, _) => 16,
+            Node::Unary(Unary::Sqrt | Unary::Reciprocal, _) | Node::Binary(Binary::Divide, ..) => DIVIDE,
+            Node::Unary(Unary::Exp2 | Unary::Log2, _) => POWER,
             Node::Unary(..) | Node::Binary(..) | Node::Select { .. } => 1,
             Node::Call(_) => match self.graph.call_of(id).map(|call| call.native) {
-                Some(Native::Lookup(_)) => 200,
-                Some(Native::Unit | Native::Place) | None => 24,
+                Some(Native::Lookup(_)) => LOOKUP,
+                Some(Native::Unit | Native::Place) | None => UNIT,
             },
         }
-    }
-
-    /// The numbers to keep where `kept` are, and no field is to be read of samples.
-    fn without_fields(&self, outputs: &[Id], kept: &[Id]) -> Vec<Id> {
-        let (mut open, mut seen) = (outputs.to_vec(), vec![false; self.graph.len()]);
-        let mut all = kept.to_vec();
-        while let Some(id) = open.pop() {
-            if kept.contains(&id) || std::mem::replace(&mut seen[id.index()], true) {
-                continue;
-            }
-            if matches!(self.graph.node(id), Node::Field(_)) && self.stays(id) {
-                all.push(id);
-            }
-            open.extend(self.graph.operands(id));
-        }
-        all.sort_unstable();
-        all
     }
 }
 

@@ -34,7 +34,7 @@ pub fn statements(tape: &Tape, indent: &str, put: fn(usize, &str) -> String) -> 
     for (at, instruction) in tape.instructions.iter().enumerate() {
         printer.close(at);
         if ahead.first() == Some(&at) {
-            (0..ahead.len()).for_each(|k| printer.footprint(&ahead[..=k]));
+            ahead.iter().enumerate().for_each(|(k, &lookup)| printer.footprint(&ahead[..k], lookup));
         }
         printer.instruction(at, instruction, ahead.contains(&at));
         for (k, slot) in tape.outputs.iter().enumerate() {
@@ -130,10 +130,10 @@ impl Printer<'_> {
         }
     }
 
-    /// The texels of the last of these lookups, which stands further down: of faces of one size they are the same.
-    fn footprint(&mut self, lookups: &[usize]) {
-        let [before @ .., at] = lookups else { return };
-        let Some((place, cube)) = self.looked_up(*at) else { return };
+    /// The texels of a lookup that stands further down: those of one `before` at the same place of faces of the same size, if
+    /// there is one.
+    fn footprint(&mut self, before: &[usize], at: usize) {
+        let Some((place, cube)) = self.looked_up(at) else { return };
         let alike = |&&other: &&usize| {
             let there = self.looked_up(other);
             there.is_some_and(|(other, faces)| other == place && self.sized_alike(faces, cube))

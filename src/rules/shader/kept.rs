@@ -16,9 +16,9 @@ use crate::minimum_cut::{Costs, NEVER, cheapest};
 use crate::model::params::Param;
 
 /// What a pass spends to read a number, in operations: what a card computes while as many bytes arrive from its memory.
-const READ: i32 = 16;
+const READ: u64 = 16;
 /// What it spends on a lookup.
-const LOOKUP: i32 = 200;
+const LOOKUP: u64 = 200;
 
 /// What is kept of the built-in effects, with WGSL types.
 const TERMS: [(&str, &str); 10] = [
@@ -174,7 +174,7 @@ impl<'a> Quantities<'a> {
         Constant::from_name(name).is_none() && !self.terms.contains(&name) && !self.moving.contains(name)
     }
 
-    /// What stays and is needed by what moves. A part that nothing moves is kept as it is.
+    /// What stays and is needed by what moves, and the parts of the sum that nothing moves.
     fn met(&self, parts: &[&'static str]) -> Vec<Thing> {
         let moved = |rule: &&&Rule| rule.gives.iter().any(|(name, _)| self.moving.contains(name));
         let needs = self.rules.iter().filter(moved).flat_map(|rule| &rule.needs).map(|(name, _)| *name);
@@ -192,7 +192,7 @@ impl<'a> Quantities<'a> {
                 let gives = |rule: &&Rule| rule.gives.iter().any(|(given, _)| *given == name);
                 let by = self.rules.iter().position(gives).map(Thing::Rule);
                 Costs {
-                    kept: READ * components(self.kind(name)) as i32,
+                    kept: READ * components(self.kind(name)) as u64,
                     // What no rule gives is a field.
                     made: if by.is_some() { 0 } else { NEVER },
                     of: by.into_iter().collect(),
@@ -207,7 +207,7 @@ impl<'a> Quantities<'a> {
     }
 
     /// What a rule costs in each pass. What reads a parameter that the terms depend on is never made of what is kept.
-    fn made(&self, rule: &Rule) -> i32 {
+    fn made(&self, rule: &Rule) -> u64 {
         let needs = rule.needs.iter().map(|(name, _)| *name);
         let constants: Vec<Constant> =
             needs.chain(rule.reads.iter().copied()).filter_map(Constant::from_name).collect();
@@ -215,7 +215,7 @@ impl<'a> Quantities<'a> {
             return NEVER;
         }
         let lookups = rule.reads.iter().filter(|name| Constant::from_name(name).is_none()).count();
-        rule.cost(self.facts) as i32 + LOOKUP * lookups as i32
+        rule.cost(self.facts) as u64 + LOOKUP * lookups as u64
     }
 }
 
@@ -224,6 +224,7 @@ mod tests {
     use super::*;
     use crate::model::effects::{Effect, Effects, Form, Silhouette};
     use crate::model::evaluate::Setup;
+    use crate::shader::term::{self, LightFamily, library};
 
     #[test]
     fn terms_are_all_that_the_built_in_rules_need_kept() {
@@ -261,5 +262,35 @@ mod tests {
         assert_eq!(held(&facts(all)).unwrap(), lookups);
         let diffuse = Effects::of(&[Effect::Diffuse]);
         assert_eq!(held(&facts(diffuse)).unwrap(), [Param::EnvironmentRotation]);
+    }
+
+    #[test]
+    fn of_each_light_on_skin_one_number_is_kept_and_what_it_makes_of_normal_and_view_is_made_anew() {
+        library::register_all();
+        for number in 1..=4 {
+            term::light(LightFamily::SkyBeam, &format!("sky_{number}")).unwrap();
+        }
+        let built_in = [Effect::Diffuse, Effect::NormalMap, Effect::Occlusion, Effect::Rim];
+        let named = ["lights", "shadows", "light_specular", "fresnel", "directional_occlusion"];
+        let lights = ["light_sky_1", "light_sky_2", "light_sky_3", "light_sky_4"];
+        let more = named.into_iter().chain(lights).map(|name| Effect::from_name(name).unwrap());
+        let effects: Effects = built_in.into_iter().chain(more).collect();
+        let facts = Facts {
+            setup: Setup::new(Form::Corrected, Silhouette::Fragment, effects),
+            source: Source::Terms,
+            ..Facts::default()
+        };
+        let kept = sample_fields(&facts);
+        for light in lights {
+            let of_light: Vec<_> = kept.iter().filter(|(name, _)| name.starts_with(light)).collect();
+            assert!(matches!(of_light[..], [(_, "f32")]), "{kept:?}");
+        }
+        // Two vectors serve all lights and the sky; with cosines of each there were as many numbers for two lights.
+        for vector in ["n", "view"] {
+            assert!(kept.iter().any(|field| *field == (vector, "vec3f")), "{kept:?}");
+        }
+        // Nothing that a pass is to make of what is kept is out of its reach.
+        let goals = parts(&facts);
+        Plan::search(&facts, &[], &goals, &names(&kept)).unwrap();
     }
 }

@@ -67,6 +67,11 @@ fn a_lit_scene_is_fitted_and_its_run_folder_draws_the_same_again() {
         constants.contains("skinfit_light_key_color") && !constants.contains("light_key_irradiance"),
         "{constants}"
     );
+    // A vertex' share of a light stands in an attribute that engines know nothing of.
+    for to in ["godot", "unity", "unreal"] {
+        let material = ["export", "run/params.toml", "--to", to, "--material", "Skin.hlsl"];
+        sandbox.run(&material).refused(&["light_key_", "which no material file hands over"]);
+    }
     // Constants of lights that a scene has not say nothing of it.
     let text = sandbox.text("run/params.toml").replace("light.bulb.color", "light.moon.color");
     sandbox.write("moon.toml", text.as_bytes());
@@ -142,9 +147,10 @@ fn lamps_beside_a_path_tracers_images_have_their_own_colours() {
     }
 }
 
-/// A search that weighed the ways to each light anew for every other's would not come back from a hundred.
+/// A search that weighed the ways to each light anew for every other's would not come back from a hundred, nor would one for what
+/// is kept of their terms.
 #[test]
-fn a_hundred_lights_are_planned_and_drawn() {
+fn a_hundred_lights_are_planned_drawn_and_fitted() {
     let sandbox = Sandbox::new();
     let more = "\"reflection\", \"lights\", \"shadows\", \"light_specular\", \"fresnel\", \"directional_occlusion\"]";
     sandbox.edit("\"reflection\"]", more);
@@ -162,4 +168,7 @@ fn a_hundred_lights_are_planned_and_drawn() {
     assert!(shader.out.contains("light_l0_") && shader.out.contains("light_l99_"), "{}", shader.out);
     let drawn = sandbox.run(&["render", "scene.toml", "--view", "front", "--engine", "cpu", "-o", "lit.exr"]);
     assert_eq!(drawn.code, Some(0), "{drawn:?}");
+    let free = ["--free", "base_weight,specular_weight,roughness,f0", "--max-iterations", "1"];
+    let fitted = sandbox.run(&[&["fit", "scene.toml", "--engine", "cpu", "-o", "run"], &free[..]].concat());
+    assert!(matches!(fitted.code, Some(0 | 1)) && sandbox.path("run/report.json").is_file(), "{fitted:?}");
 }

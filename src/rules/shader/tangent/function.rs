@@ -184,7 +184,7 @@ impl Writer<'_> {
             return Ok(());
         }
         if self.tangents.has_partials(&function) {
-            return self.by_partials(&called, arguments, result);
+            return self.by_partials(&called, (arguments, &values), result);
         }
         let Some(tangent) = self.tangents.of(&called, &moving)? else { return Ok(()) };
         let mut given = values;
@@ -203,24 +203,21 @@ impl Writer<'_> {
         self.moved.insert(result, name);
         Ok(())
     }
-}
 
-impl Writer<'_> {
-    /// A call's tangent by partial derivatives: each along 1, so that what is multiplied by it is not, and the same whatever
-    /// moves the arguments, so that all parameters share them.
+    /// A call's tangent by partial derivatives. Each is a tangent along 1, whose products with 1 vanish; and as it is the same
+    /// whatever moves the arguments, all parameters share it.
     fn by_partials(
         &mut self,
         called: &str,
-        arguments: &[Handle<Expression>],
+        (arguments, values): (&[Handle<Expression>], &[String]),
         result: Handle<Expression>,
     ) -> Result<(), TangentError> {
-        let values = arguments.iter().map(|&a| self.value(a)).collect::<Result<Vec<_>, _>>()?.join(", ");
         let mut terms = Vec::new();
         for (k, &argument) in arguments.iter().enumerate() {
             let Some(moved) = self.tangent(argument) else { continue };
             let along: Vec<bool> = (0..arguments.len()).map(|other| other == k).collect();
             if let Some(partial) = self.tangents.of(called, &along)? {
-                terms.push(format!("{}({values}, 1.0) * {moved}", partial.name));
+                terms.push(format!("{}({}, 1.0) * {moved}", partial.name, values.join(", ")));
             }
         }
         if !terms.is_empty() {
