@@ -324,7 +324,7 @@ fn a_turned_sky_moves_as_its_harmonics_do() {
         assert!(fields.iter().all(|field| own.needs().fields.iter().any(|asked| asked == *field)));
         let surface =
             PosedSurface::with_fields(&own, &posed, &rays, &[], (&bakes).into(), Fields::of(fields)).unwrap();
-        let [cosine, sine] = fields.map(|field| surface.field_of_vertices(field));
+        let [cosine, sine, curve] = fields.map(|field| surface.field_of_vertices(field));
         let (above, below) = (found(35.0 + h), found(35.0 - h));
         let (sin, cos) = 35_f64.to_radians().sin_cos();
         let mut steepest = 0.0_f64;
@@ -334,11 +334,24 @@ fn a_turned_sky_moves_as_its_harmonics_do() {
             // Ratios of about 1 in f32 over 0.007 radians, and the third derivative of up to six waves a turn.
             assert!((slope - want).abs() < 1e-3, "{visibility:?} {i}: {slope} {want}");
             // At the angle itself what is added is nothing.
-            let added = f64::from(cosine[i]) * cos + f64::from(sine[i]) * sin;
+            let added = f64::from(curve[i]) + f64::from(cosine[i]) * cos + f64::from(sine[i]) * sin;
             assert!(added.abs() < 1e-6, "{added}");
             steepest = steepest.max(want.abs());
         }
         assert!(steepest > 0.02, "{visibility:?}: {steepest}");
+        // Further away, beside what the slope alone says.
+        let (here, there, by) = (found(35.0), found(55.0), 20_f64.to_radians());
+        let (turned_sin, turned_cos) = 55_f64.to_radians().sin_cos();
+        let mut squares = [0.0; 2];
+        for (i, (here, there)) in here.iter().flatten().zip(there.iter().flatten()).enumerate() {
+            let [sine, cosine, curve] = [&sine, &cosine, &curve].map(|field| f64::from(field[i]));
+            let slope = sine * cos - cosine * sin;
+            let added = [curve + cosine * turned_cos + sine * turned_sin, slope * by.sin()];
+            for (square, added) in squares.iter_mut().zip(added) {
+                *square += (f64::from(*here) + added - f64::from(*there)).powi(2);
+            }
+        }
+        assert!(squares[0] < 0.5 * squares[1], "{visibility:?}: {squares:?}");
     }
     // Nothing turns: nobody asks.
     let held = scene(&bowl, gentle, chosen(Visibility::Sh4, Bounces::Gathered));

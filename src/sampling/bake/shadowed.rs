@@ -85,6 +85,15 @@ impl Turning {
         })
     }
 
+    /// The second derivative.
+    #[must_use]
+    pub fn curve(&self, radians: f64) -> [f64; 3] {
+        self.sum(|m| {
+            let (sine, cosine) = (m * radians).sin_cos();
+            [-m * m * cosine, -m * m * sine]
+        })
+    }
+
     /// What arrives of both.
     #[must_use]
     pub fn with(mut self, other: &Self) -> Self {
@@ -113,13 +122,15 @@ pub fn by_azimuth<T: Share>(transfer: &[T], order: Order, light: &Coefficients) 
     transfer.chunks_exact(order.functions()).map(|transfer| Turning::of(transfer, &light)).collect()
 }
 
-/// How much of the open light arrives, a channel, and its derivative by the turn.
+/// How much of the open light arrives, a channel, and its derivatives by the turn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ratio {
     /// The ratio, 1 where `transfer` is `open` to the bit and the light above the least that is counted.
     pub value: [f64; 3],
     /// Its derivative by the angle; 0 where shadowed light is floored.
     pub slope: [f64; 3],
+    /// The second one, likewise.
+    pub curve: [f64; 3],
 }
 
 /// max(0, sum T L) / max(sum T_open L, 1e-4 M), M the mean radiance; 0 where M is not above 0.
@@ -137,14 +148,16 @@ pub fn thrown_ratio(thrown: &Turning, open: &Turning, mean: [f64; 3], radians: f
 }
 
 fn ratio_above(share: f64, shadowed: &Turning, open: &Turning, mean: [f64; 3], radians: f64) -> Ratio {
-    let [(s, ds), (u, du)] = [shadowed, open].map(|light| (light.at(radians), light.slope(radians)));
-    let mut ratio = Ratio { value: [0.0; 3], slope: [0.0; 3] };
+    let of = |light: &Turning| [light.at(radians), light.slope(radians), light.curve(radians)];
+    let ([s, ds, dds], [u, du, ddu]) = (of(shadowed), of(open));
+    let mut ratio = Ratio { value: [0.0; 3], slope: [0.0; 3], curve: [0.0; 3] };
     for c in 0..3 {
         let least = share * mean[c];
         if mean[c] > 0.0 && s[c] > 0.0 {
-            let (by, slope) = if u[c] > least { (u[c], du[c]) } else { (least, 0.0) };
+            let [by, slope, curve] = if u[c] > least { [u[c], du[c], ddu[c]] } else { [least, 0.0, 0.0] };
             ratio.value[c] = s[c] / by;
             ratio.slope[c] = (ds[c] - ratio.value[c] * slope) / by;
+            ratio.curve[c] = (dds[c] - 2.0 * ratio.slope[c] * slope - ratio.value[c] * curve) / by;
         }
     }
     ratio
@@ -268,11 +281,16 @@ mod tests {
                 let slope = (at(angle + step).value[c] - at(angle - step).value[c]) / (2.0 * step);
                 // Roundings of 1e-15 over a step, and third derivatives times its square.
                 assert!((slope - ratio.slope[c]).abs() < 1e-8, "{angle}: {slope} {ratio:?}");
+                let curve = (at(angle + step).slope[c] - at(angle - step).slope[c]) / (2.0 * step);
+                assert!((curve - ratio.curve[c]).abs() < 1e-7, "{angle}: {curve} {ratio:?}");
             }
             assert!((0..2).all(|c| ratio.value[c] > 0.1));
         }
         let black = Coefficients::new(Order::MOST, Vec::new());
         let dark = Turning::of(&[1.0_f32; 36], &black);
-        assert_eq!(shadow_ratio(&dark, &dark, black.mean(), 0.5), Ratio { value: [0.0; 3], slope: [0.0; 3] });
+        assert_eq!(
+            shadow_ratio(&dark, &dark, black.mean(), 0.5),
+            Ratio { value: [0.0; 3], slope: [0.0; 3], curve: [0.0; 3] }
+        );
     }
 }

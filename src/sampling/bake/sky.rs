@@ -18,8 +18,8 @@ use crate::scene::sky_lights::sky_lights;
 
 /// The field of the sky that a sample sees: a share of what an open point receives, rgb.
 pub const SKY_RATIO: &str = "sky_ratio";
-/// The fields of how that moves with the cosine and the sine of the environment's turn.
-pub const SKY_TURNS: [&str; 2] = ["sky_cosine", "sky_sine"];
+/// The fields of how that moves with the cosine and the sine of the environment's turn, and of its second derivative.
+pub const SKY_TURNS: [&str; 3] = ["sky_cosine", "sky_sine", "sky_curve"];
 /// The field of the mean direction of the open sky.
 pub const BENT_NORMAL: &str = "bent_normal";
 

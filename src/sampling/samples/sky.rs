@@ -15,7 +15,9 @@ use crate::bake::harmonics::{CONSTANT, Order, basis, open_transfer_at};
 use crate::bake::interreflection::{Albedo, VertexGather};
 use crate::bake::panorama::Radiance;
 use crate::bake::rays::RayMesh;
-use crate::bake::shadowed::{Turning, arriving, shadow_ratio, share_of_open, thrown_ratio, thrown_share};
+use crate::bake::shadowed::{
+    Ratio, Turning, arriving, shadow_ratio, share_of_open, thrown_ratio, thrown_share,
+};
 use crate::bake::sky::{BENT_NORMAL, SKY_RATIO, SKY_TURNS};
 use crate::bake::transfer::TransferSet;
 use crate::bake::{SkyBake, SkyLight};
@@ -72,11 +74,14 @@ pub(super) fn supplies<'a>(
     if let Some(field) = bent {
         supplies.push((field, of_vertices(sky.each(|vertex| sky.bent_normal(vertex).to_array()))));
     }
-    let [cosine, sine] = SKY_TURNS.map(asked);
+    let [cosine, sine, curve] = SKY_TURNS.map(asked);
     let (sin, cos) = sky.turn.sin_cos();
-    for (field, factor) in [(cosine, -sin), (sine, cos)] {
-        let turning =
-            |vertex| sky.slope(scene.choices.visibility, vertex).map(|slope| (factor * slope) as f32);
+    // ratio' sin(r - r0) + ratio'' (1 - cos(r - r0)) by the cosine and the sine of r.
+    for (field, [of_slope, of_curve]) in [(cosine, [-sin, -cos]), (sine, [cos, -sin]), (curve, [0.0, 1.0])] {
+        let turning = |vertex| {
+            let Ratio { slope, curve, .. } = sky.turning(scene.choices.visibility, vertex);
+            [0, 1, 2].map(|c| (of_slope * slope[c] + of_curve * curve[c]) as f32)
+        };
         supplies.extend(field.map(|field| (field, of_vertices(sky.each(turning)))));
     }
     if let (Some(field), Some(light)) = (ratio, &bake.light) {
@@ -179,8 +184,9 @@ impl<'a> Sky<'a> {
         share_of_open(arrived, lit, mean).map(|share| share as f32)
     }
 
-    /// How fast that moves as the environment turns, a radian; 0 where it is at 0.
-    fn slope(&self, visibility: Visibility, vertex: usize) -> [f64; 3] {
+    /// How that moves as the environment turns, by radians; not at all where it is at 0. The value is that of light that
+    /// harmonics hold alone.
+    fn turning(&self, visibility: Visibility, vertex: usize) -> Ratio {
         let functions = self.order.functions();
         let bounced = self.set.bounced.get(vertex * functions..(vertex + 1) * functions);
         let thrown = bounced.map(|bounced| Turning::of(bounced, &self.whole)).unwrap_or_default();
@@ -189,13 +195,13 @@ impl<'a> Sky<'a> {
         let mean = self.rest.mean();
         let arriving = match visibility {
             // The open share itself stays.
-            Visibility::Scalar => return thrown_ratio(&thrown, &open, mean, 0.0).slope,
+            Visibility::Scalar => return thrown_ratio(&thrown, &open, mean, 0.0),
             Visibility::Cone => {
                 thrown.with(&self.cone(vertex).map_or(open, |cone| Turning::of(&cone, &self.rest)))
             }
             _ => thrown.with(&Turning::of(self.direct(vertex), &self.rest)),
         };
-        shadow_ratio(&arriving, &open, mean, 0.0).slope
+        shadow_ratio(&arriving, &open, mean, 0.0)
     }
 
     /// The same by rays from each sample; `panorama` is the environment without its lights.

@@ -317,7 +317,7 @@ fn found(name: &str, at: &FragmentInputs, rng: &mut StdRng) -> [f32; 3] {
         name if ["_open", "_far"].iter().any(|end| name.ends_with(end)) || name == "lobe_seen" => {
             three(share(rng).abs())
         }
-        "sky_cosine" | "sky_sine" => std::array::from_fn(|_| rng.random_range(-2.0..=2.0)),
+        "sky_cosine" | "sky_sine" | "sky_curve" => std::array::from_fn(|_| rng.random_range(-2.0..=2.0)),
         // None where a sample stands for nothing.
         "lobe_nodes" if rng.random_range(0..6) == 0 => [0.0; 3],
         "lobe_nodes" => [0.2, 0.4, 0.8],

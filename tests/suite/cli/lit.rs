@@ -67,10 +67,12 @@ fn a_lit_scene_is_fitted_and_its_run_folder_draws_the_same_again() {
         constants.contains("skinfit_light_key_color") && !constants.contains("light_key_irradiance"),
         "{constants}"
     );
-    // A vertex' share of a light stands in an attribute that engines know nothing of.
-    for to in ["godot", "unity", "unreal"] {
+    // A vertex' share of a light stands in an attribute that engines know nothing of, and a bulb in the scene's world.
+    for (to, what) in
+        [("godot", "light_key_open"), ("unity", "light_key_open"), ("unreal", "light_bulb_direction")]
+    {
         let material = ["export", "run/params.toml", "--to", to, "--material", "Skin.hlsl"];
-        sandbox.run(&material).refused(&["light_key_", "which no material file hands over"]);
+        sandbox.run(&material).refused(&[what, "which no material file hands over"]);
     }
     // Constants of lights that a scene has not say nothing of it.
     let text = sandbox.text("run/params.toml").replace("light.bulb.color", "light.moon.color");

@@ -210,6 +210,7 @@ impl<'v> Composed<'v> {
             "sky_ratio" => ratio.value,
             "sky_cosine" => ratio.slope.map(|slope| -turn.sin() * slope),
             "sky_sine" => ratio.slope.map(|slope| turn.cos() * slope),
+            "sky_curve" => [0.0; 3],
             other => panic!("a sample has no {other}"),
         }
     }

@@ -50,6 +50,7 @@ fn samples_show_the_share_of_the_sky_that_the_vectors_say_and_how_it_turns_on_ev
             ("sky_ratio", ratio.value.to_vec()),
             ("sky_cosine", vec![0.0; 3]),
             ("sky_sine", ratio.slope.to_vec()),
+            ("sky_curve", vec![0.0; 3]),
         ]);
         Case { at, f32_rel: None, params: params.clone(), fields }
     };

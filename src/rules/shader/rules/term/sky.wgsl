@@ -4,6 +4,7 @@
 // sample_field: sky_ratio: vec3f = 1; light that arrives of the environment, as a share of what an open point receives
 // sample_field: sky_cosine: vec3f = 0; how that moves with the cosine of the environment's turn
 // sample_field: sky_sine: vec3f = 0; how it moves with the sine
+// sample_field: sky_curve: vec3f = 0; how fast that change changes with the angle
 
 // The ratio as it was found.
 //
@@ -15,15 +16,21 @@ fn share_of_sky(sky_ratio: vec3f) -> vec3f {
     return sky_ratio;
 }
 
-// The ratio as the environment turns by r from where it was found, at r0: ratio + ratio' sin(r - r0), ratio' from the
-// harmonics' own turn.
+// The ratio as the environment turns by r from where it was found, at r0: ratio + ratio' sin(r - r0)
+// + ratio'' (1 - cos(r - r0)), ratio' and ratio'' from the harmonics' own turn.
 //
 // gives: sky_share
 // domain: texel, fragment
 // when: directional_occlusion, turning_sky
-// cost: 12
-fn share_of_turning_sky(sky_ratio: vec3f, sky_cosine: vec3f, sky_sine: vec3f, turn: vec2f) -> vec3f {
-    return max(sky_ratio + (turn.x * sky_cosine + turn.y * sky_sine), vec3f(0.0));
+// cost: 15
+fn share_of_turning_sky(
+    sky_ratio: vec3f,
+    sky_cosine: vec3f,
+    sky_sine: vec3f,
+    sky_curve: vec3f,
+    turn: vec2f,
+) -> vec3f {
+    return max(sky_ratio + (sky_curve + turn.x * sky_cosine + turn.y * sky_sine), vec3f(0.0));
 }
 
 // occ = 1 - occlusion (1 - ratio), a channel (MODEL 10).
