@@ -2,7 +2,7 @@
 //!
 //! Where such a number meets one that moves, the graph is cut: the number is computed once, kept beside the sample,
 //! and read by later passes like a field; or each pass computes it anew, of other numbers that are kept and of fields:
-//! what takes the least time of all ([`minimum_cut`](crate::minimum_cut)).
+//! what takes the least time of all (`minimum_cut`).
 
 use super::graph::{Binary, Graph, Id, Input, Native, Node, Unary};
 use crate::minimum_cut::{Costs, NEVER, cheapest};

@@ -2,7 +2,7 @@
 //!
 //! Of the built-in effects that is the light of each term before its weights. Of an added one it is what the rules that its
 //! own parameters move need, and those parameters do not move; or what that is made of, where a pass takes less time to read
-//! that and to compute the rest anew ([`minimum_cut`](crate::minimum_cut)).
+//! that and to compute the rest anew (`minimum_cut`).
 
 use std::collections::BTreeSet;
 
@@ -287,7 +287,7 @@ mod tests {
         }
         // Two vectors serve all lights and the sky; with cosines of each there were as many numbers for two lights.
         for vector in ["n", "view"] {
-            assert!(kept.iter().any(|field| *field == (vector, "vec3f")), "{kept:?}");
+            assert!(kept.contains(&(vector, "vec3f")), "{kept:?}");
         }
         // Nothing that a pass is to make of what is kept is out of its reach.
         let goals = parts(&facts);

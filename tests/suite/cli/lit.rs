@@ -68,9 +68,7 @@ fn a_lit_scene_is_fitted_and_its_run_folder_draws_the_same_again() {
         "{constants}"
     );
     // A vertex' share of a light stands in an attribute that engines know nothing of, and a bulb in the scene's world.
-    for (to, what) in
-        [("godot", "light_key_open"), ("unity", "light_key_open"), ("unreal", "light_bulb_direction")]
-    {
+    for (to, what) in [("godot", "light_key_"), ("unity", "light_key_"), ("unreal", "light_bulb_direction")] {
         let material = ["export", "run/params.toml", "--to", to, "--material", "Skin.hlsl"];
         sandbox.run(&material).refused(&[what, "which no material file hands over"]);
     }
