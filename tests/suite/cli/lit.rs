@@ -15,7 +15,7 @@ intensity = 4
 ";
 
 /// The scene with two lights, of which `free` is free beside the base weight; its targets show them.
-fn scene(free: &str) -> Sandbox {
+pub(super) fn scene(free: &str) -> Sandbox {
     let sandbox = Sandbox::new();
     sandbox.edit("\"hilite\", \"reflection\"]", "\"hilite\", \"reflection\", \"lights\", \"shadows\"]");
     sandbox.edit("[fit]\n", &format!("{KEY}{BULB}"));

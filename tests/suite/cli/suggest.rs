@@ -1,5 +1,6 @@
 //! `skinfit suggest`: it finds what made the targets, says what that costs, and leaves a scene that can be fitted.
 
+use super::lit;
 use super::sandbox::{Ran, Sandbox};
 
 /// The scene, whose targets every effect of its list has had a part in.
@@ -51,6 +52,24 @@ fn what_made_the_targets_is_found_and_fitted() {
     // The scene that it leaves has those effects, and fits.
     let scene = sandbox.text("which/scene.toml");
     assert!(scene.contains("# a comment") && scene.contains("effects = [\"diffuse\""), "{scene}");
+    let fitted = sandbox.run(&["fit", "which/scene.toml", "-o", "run", "--engine", "cpu"]);
+    assert_eq!(fitted.code, Some(0), "{fitted:?}");
+}
+
+#[test]
+fn lamps_and_their_shadows_are_found_where_targets_show_them() {
+    let sandbox = lit::scene("\"light.key.color\"");
+    let ran = sandbox.run(&["suggest", "scene.toml", "-o", "which", "--gpu", "never"]).done();
+    let results = sandbox.json("which/results.json");
+    let chosen = results["suggested"].as_array().unwrap();
+    for effect in ["lights", "shadows"] {
+        assert!(chosen.iter().any(|name| name == effect), "{effect}: {chosen:?}\n{}", ran.out);
+    }
+    // A path tracer's gloss is nowhere in them.
+    assert!(!chosen.iter().any(|name| name == "fresnel"), "{chosen:?}\n{}", ran.out);
+    // The scene that it leaves has the lamps, and fits.
+    let scene = sandbox.text("which/scene.toml");
+    assert!(scene.contains("name = \"key\"") && scene.contains("\"lights\", \"shadows\""), "{scene}");
     let fitted = sandbox.run(&["fit", "which/scene.toml", "-o", "run", "--engine", "cpu"]);
     assert_eq!(fitted.code, Some(0), "{fitted:?}");
 }
