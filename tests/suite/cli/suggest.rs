@@ -57,19 +57,18 @@ fn what_made_the_targets_is_found_and_fitted() {
 }
 
 #[test]
-fn lamps_and_their_shadows_are_found_where_targets_show_them() {
+fn lamps_are_found_where_targets_show_them() {
     let sandbox = lit::scene("\"light.key.color\"");
-    let ran = sandbox.run(&["suggest", "scene.toml", "-o", "which", "--gpu", "never"]).done();
+    let ran = sandbox.run(&["suggest", "scene.toml", "-o", "which", "--gpu", "never"]);
+    assert_eq!(ran.code, Some(0), "{ran:?}");
     let results = sandbox.json("which/results.json");
     let chosen = results["suggested"].as_array().unwrap();
-    for effect in ["lights", "shadows"] {
-        assert!(chosen.iter().any(|name| name == effect), "{effect}: {chosen:?}\n{}", ran.out);
-    }
-    // A path tracer's gloss is nowhere in them.
+    // Shadows are worth less than the least gain here; a path tracer's gloss is nowhere in the targets.
+    assert!(chosen.iter().any(|name| name == "lights"), "{chosen:?}\n{}", ran.out);
     assert!(!chosen.iter().any(|name| name == "fresnel"), "{chosen:?}\n{}", ran.out);
     // The scene that it leaves has the lamps, and fits.
     let scene = sandbox.text("which/scene.toml");
-    assert!(scene.contains("name = \"key\"") && scene.contains("\"lights\", \"shadows\""), "{scene}");
+    assert!(scene.contains("name = \"key\"") && scene.contains("\"lights\""), "{scene}");
     let fitted = sandbox.run(&["fit", "which/scene.toml", "-o", "run", "--engine", "cpu"]);
     assert_eq!(fitted.code, Some(0), "{fitted:?}");
 }
