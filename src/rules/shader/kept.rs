@@ -15,7 +15,7 @@ use super::search::{PlanError, components};
 use crate::minimum_cut::{Costs, NEVER, cheapest};
 use crate::model::params::Param;
 
-/// What a pass spends to read a number, in operations: what a card computes while as many bytes arrive from its memory.
+/// What a pass spends to read a number, in operations: an estimate, as adapters differ.
 const READ: u64 = 16;
 /// What it spends on a lookup.
 const LOOKUP: u64 = 200;
@@ -285,7 +285,7 @@ mod tests {
             let of_light: Vec<_> = kept.iter().filter(|(name, _)| name.starts_with(light)).collect();
             assert!(matches!(of_light[..], [(_, "f32")]), "{kept:?}");
         }
-        // Two vectors serve all lights and the sky; with cosines of each there were as many numbers for two lights.
+        // Two vectors serve all lights and the sky.
         for vector in ["n", "view"] {
             assert!(kept.contains(&(vector, "vec3f")), "{kept:?}");
         }
