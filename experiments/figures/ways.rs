@@ -9,10 +9,11 @@ use crate::studies::{number, study_of};
 const LIT: [&str; 2] = ["forest", "sunrise"];
 const SCATTERING: [&str; 3] = ["forest", "sunrise", "studio"];
 
-const LIGHT: [&str; 11] = [
+const LIGHT: [&str; 12] = [
     "sky_lights",
     "visibility",
     "specular_visibility",
+    "specular_model",
     "split_sum",
     "lobe_lookup",
     "skin_reflection",
@@ -26,7 +27,7 @@ const DIFFUSION: [&str; 8] =
     ["taps", "light_map_size", "seams", "ambient_normal", "stretch", "unblurred", "combined", "levels"];
 
 /// Plots of the forest that the page shows.
-const PLOTS: [&str; 2] = ["sky_lights", "visibility"];
+const PLOTS: [&str; 5] = ["shadows", "sky_lights", "visibility", "specular_visibility", "rays"];
 
 /// experiments/accuracy_vs_time/light.json, and plots beside it.
 pub(crate) fn light(lab: &Lab) -> Result<Value> {

@@ -120,10 +120,10 @@ impl Lights {
         self.terms.iter().fold(effects, |effects, term| effects.with(term.effect))
     }
 
-    /// Say so where they do not shine.
-    pub(super) fn idle(&self, path: &Path, effects: Effects, warnings: &mut Warnings) {
+    /// Say so where they do not shine, unless who reads the scene has `chosen` its effects and not the file.
+    pub(super) fn idle(&self, path: &Path, effects: Effects, chosen: bool, warnings: &mut Warnings) {
         let lights = effects.has(Effect::Lights);
-        if !self.terms.is_empty() && !lights {
+        if !self.terms.is_empty() && !lights && !chosen {
             warn(warnings, path, "has lights, but the effect `lights` is off: they do not shine");
         }
         if self.terms.is_empty() && lights {

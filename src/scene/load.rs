@@ -100,7 +100,7 @@ impl Scene {
             effects = terms.iter().fold(effects, |effects, term| effects.with(term.effect));
         }
         let effects = diffusion.switched(lights.switched(effects));
-        lights.idle(&source.path, effects, &mut warnings);
+        lights.idle(&source.path, effects, options.effects.is_some(), &mut warnings);
         for (effect, other) in effects.idle() {
             let (effect, other) = (effect.name(), other.name());
             warn(

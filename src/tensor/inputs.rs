@@ -44,13 +44,14 @@ pub struct Inputs {
 pub(super) type TrackedTensor = FloatTensor<Autodiff<CubeBackend>>;
 
 impl Inputs {
-    /// Whether any of them is tracked.
-    pub(super) fn is_tracked(&self) -> bool {
+    /// Those that are tracked.
+    pub(super) fn all_tracked(&self) -> Vec<Input> {
         let Self { columns, albedo, specular, attenuator, open, bump, .. } = self;
         let Self { irradiance, lobe, hilite, reflected, glossy, .. } = self;
         let of_samples = [albedo, specular, attenuator, open, bump];
         let matrices = of_samples.into_iter().chain([irradiance, lobe, hilite, reflected, glossy]);
-        columns.is_autodiff() || matrices.into_iter().any(Tensor::is_autodiff)
+        let tracked = [columns.is_autodiff()].into_iter().chain(matrices.map(Tensor::is_autodiff));
+        Input::ALL.into_iter().zip(tracked).filter(|(_, tracked)| *tracked).map(|(input, _)| input).collect()
     }
 
     /// Their primitives in the order of [`Input::ALL`], cut from any graph.

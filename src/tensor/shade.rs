@@ -99,9 +99,12 @@ impl Shade {
     /// 0 where a slot is padding. It is differentiable in whatever input is tracked, once.
     ///
     /// # Errors
-    /// When an input that the effects read has another shape, or is not on the device.
+    /// When an input that the effects read has another shape, or is not on the device; when one is tracked that has no derivative.
     pub fn image(&self, inputs: Inputs) -> Result<Tensor<2>, TensorError> {
-        if !inputs.is_tracked() {
+        let tracked = inputs.all_tracked();
+        // A backward pass returns nothing: what it could not do has to be said here.
+        tracked.iter().try_for_each(|&input| self.0.adjoint.moves(input))?;
+        if tracked.is_empty() {
             let image = self.0.forward(&inputs.plain()?)?;
             return Ok(Tensor::from_primitive::<CubeBackend>(image));
         }

@@ -52,7 +52,7 @@ fn fresnel_light(fresnel_share: f32, mirror_light: vec4f, fresnel_weight: vec3f)
 ";
 
 /// The term, registered once.
-fn term() -> &'static Term {
+pub(crate) fn term() -> &'static Term {
     static TERM: OnceLock<&'static Term> = OnceLock::new();
     TERM.get_or_init(|| register("fresnel", FRESNEL).unwrap_or_else(|error| panic!("{error}")))
 }

@@ -1,9 +1,10 @@
 //! The texels of sixteen bilinear lookups, and their transposition to a number a lane.
 
 use fearless_simd::prelude::*;
-use fearless_simd::{f32x8, f32x16, i32x16};
+use fearless_simd::{f32x4, f32x8, f32x16, i32x16};
 
 use super::lanes::Lanes;
+use crate::model::real::Real;
 use crate::samples::LANES;
 use crate::samples::rows::Row;
 use crate::simd::Simd;
@@ -20,13 +21,8 @@ impl<S: Simd> Corners<S> {
     #[inline(always)]
     pub(super) fn load(texels: &[[f32; 4]], row: usize, first: Lanes<S>) -> Self {
         let simd = first.0.simd;
-        let first: i32x16<S> = first.0.to_int();
-        // Four numbers a texel. Through memory: taking sixteen numbers out of a register costs more.
-        let Line(first) = std::hint::black_box(Line((first << 2).to_array()));
-        // Slices of equal length, so that one check of an index covers all four corners.
-        let numbers: &[f32] = bytemuck::cast_slice(texels);
-        let count = numbers.len() - 4 * row;
-        let (upper, lower) = (&numbers[..count], &numbers[4 * row..][..count]);
+        let Line(first) = std::hint::black_box(Line(numbers_before(first)));
+        let (upper, lower) = both_rows(texels, row);
         let mut rows = [[f32x16::splat(simd, 0.0); 8]; 2];
         for pair in 0..8 {
             // By way of u32, so that the end of a range cannot overflow, which would be asked too.
@@ -37,19 +33,130 @@ impl<S: Simd> Corners<S> {
         Self([transposed(simd, rows[0]), transposed(simd, rows[1])])
     }
 
-    /// A channel's four corners.
+    /// A channel's blend at (`fx`, `fy`), and its derivatives by both.
     #[inline(always)]
-    pub(super) fn of(&self, channel: usize) -> [Lanes<S>; 4] {
-        let [upper, lower] = &self.0;
+    pub(super) fn with_gradient(&self, channel: usize, [fx, fy]: [Lanes<S>; 2]) -> [Lanes<S>; 3] {
+        let Self([upper, lower]) = self;
         let ([a, b], [c, d]) = (upper[channel], lower[channel]);
-        [a, b, c, d]
+        let (left_step, right_step) = (c - a, d - b);
+        // Between the rows first, as all lookups are.
+        let (left, right) = (fy.mul_add(left_step, a), fy.mul_add(right_step, b));
+        let across = right - left;
+        [fx.mul_add(across, left), across, fx.mul_add(right_step - left_step, left_step)]
     }
+}
+
+/// Of each channel the left and the right texels of each lane's lookup, blended between its rows by `fy`.
+#[inline(always)]
+pub(super) fn blended_rows<S: Simd>(
+    texels: &[[f32; 4]],
+    row: usize,
+    first: Lanes<S>,
+    fy: Lanes<S>,
+) -> [[Lanes<S>; 2]; 4] {
+    // Where registers are shorter, lanes are blended before they are transposed: half as many numbers are.
+    if <S::f32s as SimdBase<S>>::LEN < LANES {
+        return blended_then_transposed(texels, row, first, fy);
+    }
+    let Corners([upper, lower]) = Corners::load(texels, row, first);
+    let mut blended = upper;
+    for channel in 0..4 {
+        for side in 0..2 {
+            let (a, b) = (upper[channel][side], lower[channel][side]);
+            blended[channel][side] = fy.mul_add(b - a, a);
+        }
+    }
+    blended
+}
+
+#[inline(always)]
+fn blended_then_transposed<S: Simd>(
+    texels: &[[f32; 4]],
+    row: usize,
+    first: Lanes<S>,
+    fy: Lanes<S>,
+) -> [[Lanes<S>; 2]; 4] {
+    let simd = first.0.simd;
+    let (Line(first), Line(fy)) = std::hint::black_box((Line(numbers_before(first)), Line(fy.0.to_array())));
+    let (upper, lower) = both_rows(texels, row);
+    assert!(upper.len() >= 8, "a lookup is of two texels a row");
+    let last = upper.len() - 8;
+    let mut fours = [[f32x8::splat(simd, 0.0); 4]; 4];
+    for k in 0..4 {
+        let mut pairs = [f32x8::splat(simd, 0.0); 4];
+        for j in 0..4 {
+            let lane = 4 * k + j;
+            // A bound, not a check: that would end a block of instructions.
+            let i = (first[lane] as u32 as usize).min(last);
+            let a = f32x8::from_slice(simd, &upper[i..i + 8]);
+            let b = f32x8::from_slice(simd, &lower[i..i + 8]);
+            pairs[j] = f32x8::splat(simd, fy[lane]).mul_add(b - a, a);
+        }
+        fours[k] = four_transposed(simd, pairs);
+    }
+    let mut sides = [[Lanes::splat(simd, 0.0); 2]; 4];
+    for channel in 0..4 {
+        let [a, b, c, d] = fours;
+        sides[channel] = apart(simd, [a[channel], b[channel], c[channel], d[channel]]);
+    }
+    sides
+}
+
+/// How many numbers stand before each lane's first texel. Through memory, from here on: taking sixteen numbers out of a
+/// register costs more.
+#[inline(always)]
+fn numbers_before<S: Simd>(first: Lanes<S>) -> [i32; LANES] {
+    let first: i32x16<S> = first.0.to_int();
+    // Four numbers a texel.
+    (first << 2).to_array()
+}
+
+/// The numbers of the texels, and those `row` texels later: slices of equal length, so that one check of an index covers all
+/// four corners.
+#[inline(always)]
+fn both_rows(texels: &[[f32; 4]], row: usize) -> (&[f32], &[f32]) {
+    let numbers: &[f32] = bytemuck::cast_slice(texels);
+    let count = numbers.len() - 4 * row;
+    (&numbers[..count], &numbers[4 * row..][..count])
+}
+
+/// Four lanes' pairs of RGBA texels to each channel's left numbers and, behind them, its right ones.
+#[inline(always)]
+fn four_transposed<S: Simd>(simd: S, [a, b, c, d]: [f32x8<S>; 4]) -> [f32x8<S>; 4] {
+    let ((rb0, ga0), (rb1, ga1)) = (unzipped(simd, a, b), unzipped(simd, c, d));
+    let ((r, b), (g, a)) = (unzipped(simd, rb0, rb1), unzipped(simd, ga0, ga1));
+    [r, g, b, a]
+}
+
+/// The numbers at even and at odd places of each half: one instruction each, where halves do not mix.
+#[inline(always)]
+fn unzipped<S: Simd>(simd: S, a: f32x8<S>, b: f32x8<S>) -> (f32x8<S>, f32x8<S>) {
+    let ((a0, a1), (b0, b1)) = (simd.split_f32x8(a), simd.split_f32x8(b));
+    (
+        simd.combine_f32x4(simd.unzip_low_f32x4(a0, b0), simd.unzip_low_f32x4(a1, b1)),
+        simd.combine_f32x4(simd.unzip_high_f32x4(a0, b0), simd.unzip_high_f32x4(a1, b1)),
+    )
+}
+
+/// The lower halves, and the upper ones.
+#[inline(always)]
+fn apart<S: Simd>(simd: S, fours: [f32x8<S>; 4]) -> [Lanes<S>; 2] {
+    let mut halves = [[f32x4::splat(simd, 0.0); 4]; 2];
+    for k in 0..4 {
+        (halves[0][k], halves[1][k]) = simd.split_f32x8(fours[k]);
+    }
+    let mut sides = [Lanes::splat(simd, 0.0); 2];
+    for side in 0..2 {
+        let [a, b, c, d] = halves[side];
+        sides[side] = Lanes(simd.combine_f32x8(simd.combine_f32x4(a, b), simd.combine_f32x4(c, d)));
+    }
+    sides
 }
 
 /// A cache line on the stack. A function that holds one aligns its stack to lines; in one that does not, each register
 /// that is put there for a while lies across two of them, and a forward pass takes a fifth longer.
 #[repr(align(64))]
-struct Line([i32; LANES]);
+struct Line<T>([T; LANES]);
 
 /// Numbers that stand in memory from here on. Each check of an index ends a block of instructions, and the compiler moves what
 /// is made of texels down to the block where it is read: behind the texels of all lookups, each of which would be held

@@ -3,7 +3,7 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x16, i32x16, mask32x16};
 
-use super::corners::{Corners, made_here};
+use super::corners::{Corners, blended_rows, made_here};
 use super::lanes::Lanes;
 use crate::model::real::Real;
 use crate::simd::Simd;
@@ -130,11 +130,10 @@ impl<S: Simd> Real for Lanes<S> {
     #[inline(always)]
     fn bilinear(texels: &[[f32; 4]], row: usize, index: Self, fx: Self, fy: Self) -> [Self; 4] {
         let mut values = [fx; 4];
-        let corners = Corners::load(texels, row, index);
+        let sides = blended_rows(texels, row, index, fy);
         for channel in 0..4 {
-            let [a, b, c, d] = corners.of(channel);
-            let (upper, lower) = (fx.mul_add(b - a, a), fx.mul_add(d - c, c));
-            values[channel] = fy.mul_add(lower - upper, upper);
+            let [left, right] = sides[channel];
+            values[channel] = fx.mul_add(right - left, left);
         }
         values
     }
@@ -150,12 +149,8 @@ impl<S: Simd> Real for Lanes<S> {
         let (mut values, mut slopes) = ([fx; 4], [fx; 4]);
         let corners = Corners::load(texels, row, index);
         for channel in 0..4 {
-            let [a, b, c, d] = corners.of(channel);
-            let (upper_step, lower_step) = (b - a, d - c);
-            let (upper, lower) = (fx.mul_add(upper_step, a), fx.mul_add(lower_step, c));
-            let down = lower - upper;
-            values[channel] = fy.mul_add(down, upper);
-            let across = fy.mul_add(lower_step - upper_step, upper_step);
+            let [value, across, down] = corners.with_gradient(channel, [fx, fy]);
+            values[channel] = value;
             slopes[channel] = dx.mul_add(across, dy * down);
         }
         (made_here(values), made_here(slopes))
@@ -171,13 +166,8 @@ impl<S: Simd> Real for Lanes<S> {
         let mut parts = [[fx; 4]; 3];
         let corners = Corners::load(texels, row, index);
         for channel in 0..4 {
-            let [a, b, c, d] = corners.of(channel);
-            let (upper_step, lower_step) = (b - a, d - c);
-            let (upper, lower) = (fx.mul_add(upper_step, a), fx.mul_add(lower_step, c));
-            let down = lower - upper;
-            parts[0][channel] = fy.mul_add(down, upper);
-            parts[1][channel] = fy.mul_add(lower_step - upper_step, upper_step);
-            parts[2][channel] = down;
+            let [value, across, down] = corners.with_gradient(channel, [fx, fy]);
+            (parts[0][channel], parts[1][channel], parts[2][channel]) = (value, across, down);
         }
         parts
     }

@@ -74,15 +74,17 @@ pub(super) fn supplies<'a>(
     if let Some(field) = bent {
         supplies.push((field, of_vertices(sky.each(|vertex| sky.bent_normal(vertex).to_array()))));
     }
-    let [cosine, sine, curve] = SKY_TURNS.map(asked);
+    let turns = SKY_TURNS.map(asked);
+    let ratios: Vec<Ratio> = match turns {
+        [None, None, None] => Vec::new(),
+        _ => sky.each(|vertex| sky.turning(scene.choices.visibility, vertex)),
+    };
     let (sin, cos) = sky.turn.sin_cos();
     // ratio' sin(r - r0) + ratio'' (1 - cos(r - r0)) by the cosine and the sine of r.
-    for (field, [of_slope, of_curve]) in [(cosine, [-sin, -cos]), (sine, [cos, -sin]), (curve, [0.0, 1.0])] {
-        let turning = |vertex| {
-            let Ratio { slope, curve, .. } = sky.turning(scene.choices.visibility, vertex);
-            [0, 1, 2].map(|c| (of_slope * slope[c] + of_curve * curve[c]) as f32)
-        };
-        supplies.extend(field.map(|field| (field, of_vertices(sky.each(turning)))));
+    for (field, [of_slope, of_curve]) in turns.into_iter().zip([[-sin, -cos], [cos, -sin], [0.0, 1.0]]) {
+        let turning =
+            |ratio: &Ratio| [0, 1, 2].map(|c| (of_slope * ratio.slope[c] + of_curve * ratio.curve[c]) as f32);
+        supplies.extend(field.map(|field| (field, of_vertices(ratios.iter().map(turning).collect()))));
     }
     if let (Some(field), Some(light)) = (ratio, &bake.light) {
         let visibility = scene.choices.visibility;
@@ -133,7 +135,7 @@ impl<'a> Sky<'a> {
     }
 
     /// What `of` finds at each vertex. All cores.
-    pub(super) fn each(&self, of: impl Fn(usize) -> [f32; 3] + Send + Sync) -> Vec<[f32; 3]> {
+    pub(super) fn each<T: Send>(&self, of: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
         (0..self.mesh.positions.len()).into_par_iter().map(of).collect()
     }
 

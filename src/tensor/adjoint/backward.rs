@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::text::{HEAD, Text};
-use super::{Adjoint, AdjointError, Binding, Input, LOOKUPS, Module, WORKGROUP};
+use super::{Adjoint, AdjointError, Binding, Input, Lookup, Module, WORKGROUP};
 use crate::model::params::{Channels, Param};
 use crate::shader::Domain;
 use crate::shader::emit::with_haze;
@@ -17,26 +17,29 @@ enum Gain {
     Column(usize),
     /// It is a sample's: of one component, or channel by channel.
     Field(Input, Option<usize>),
-    /// It is that of a light.
-    Light(usize),
+    /// It is that of the light of a lookup, at that place.
+    Light(usize, &'static str),
 }
 
 impl Adjoint {
     /// The module that yields the adjoints of `wanted`, which the model reads.
     ///
     /// # Errors
-    /// When a rule has no derivative.
+    /// When a rule has no derivative, or a wanted cube none.
     pub fn backward(&self, wanted: &[Input]) -> Result<Module, AdjointError> {
         let mut text = Text::new(self);
         text.bind(Binding::ImageAdjoint);
-        let (seeds, gains): (Vec<Seed>, Vec<Vec<Gain>>) =
-            wanted.iter().flat_map(|&input| self.seeds(input)).unzip();
+        let mut moved = Vec::new();
+        for &input in wanted {
+            moved.extend(self.seeds(input)?);
+        }
+        let (seeds, gains): (Vec<Seed>, Vec<Vec<Gain>>) = moved.into_iter().unzip();
         let chain = Chain::new(&self.plan, &seeds)?;
         for gain in gains.iter().flatten() {
             match *gain {
                 Gain::Column(_) => text.bind(Binding::PartialSums),
                 Gain::Field(input, _) => text.bind(Binding::Gradient(input)),
-                Gain::Light(index) => {
+                Gain::Light(index, _) => {
                     text.bind(Binding::LightAdjoint(index));
                     text.bind(Binding::LightPlace(index));
                 }
@@ -74,9 +77,9 @@ impl Adjoint {
     }
 
     /// What moves for an input's sake, and what becomes of each tangent.
-    fn seeds(&self, input: Input) -> Vec<(Seed, Vec<Gain>)> {
+    fn seeds(&self, input: Input) -> Result<Vec<(Seed, Vec<Gain>)>, AdjointError> {
         let named = Seed::named;
-        match input {
+        Ok(match input {
             Input::Columns => {
                 let columns = || self.columns.iter().enumerate();
                 let first =
@@ -97,14 +100,14 @@ impl Adjoint {
             Input::Specular | Input::Attenuator | Input::Open => {
                 vec![(named(input.name(), "1.0"), vec![Gain::Field(input, Some(0))])]
             }
-            Input::Irradiance | Input::Lobe | Input::Hilite | Input::Reflected | Input::Glossy => self
-                .lookups(input)
-                .into_iter()
-                .map(|(i, lookup)| {
-                    (named(lookup.light, &format!("{}(1.0)", lookup.kind)), vec![Gain::Light(i)])
-                })
-                .collect(),
-        }
+            Input::Irradiance | Input::Lobe | Input::Hilite | Input::Reflected | Input::Glossy => {
+                let of = |(i, lookup): (usize, Lookup)| {
+                    let (light, kind) = lookup.light;
+                    Ok((named(light, &format!("{kind}(1.0)")), vec![Gain::Light(i, lookup.placed()?)]))
+                };
+                self.lookups(input).map(of).collect::<Result<_, AdjointError>>()?
+            }
+        })
     }
 
     /// The line that takes a tangent to where it is wanted.
@@ -128,12 +131,11 @@ impl Adjoint {
                 input.name(),
                 input.width().unwrap_or(1)
             ),
-            Gain::Light(index) => {
+            Gain::Light(index, place) => {
                 let _ = writeln!(wgsl, "        let gained_light{index} = adjoint * {moved};");
                 let _ = (0..4).try_for_each(|c| {
                     writeln!(wgsl, "        light{index}_adjoint[4u * s + {c}u] = gained_light{index}[{c}];")
                 });
-                let place = LOOKUPS[index].place;
                 (0..3).try_for_each(|c| {
                     writeln!(wgsl, "        light{index}_place[3u * s + {c}u] = {place}[{c}];")
                 })

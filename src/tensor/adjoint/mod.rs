@@ -24,31 +24,49 @@ use crate::shader::PlanError;
 use crate::shader::emit::{Plan, plan, sample_fields, shown};
 use crate::shader::facts::{Budget, Facts, MapFacts, Source};
 use crate::shader::module::uniform;
-use crate::shader::quantity::Constant;
+use crate::shader::quantity::{Constant, Resource};
+use crate::shader::rule::Rule;
 use crate::shader::search::components;
 use crate::shader::tangent::TangentError;
 
 /// Threads of a workgroup.
 pub const WORKGROUP: u32 = 64;
 
-/// A lookup of a cube: the light that it yields, where, and the light's WGSL type.
+/// A lookup of a cube: a step of the plan that reads its faces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Lookup {
     /// The cube.
     pub cube: Input,
-    light: &'static str,
-    place: &'static str,
-    kind: &'static str,
+    /// The quantity that it yields, and its WGSL type.
+    light: (&'static str, &'static str),
+    /// The quantity that says where on the faces; `None` where the rule itself finds the place, or a texel looks up.
+    place: Option<&'static str>,
 }
 
-const LOOKUPS: [Lookup; 6] = [
-    Lookup { cube: Input::Irradiance, light: "irradiance", place: "n_place", kind: "vec3f" },
-    Lookup { cube: Input::Lobe, light: "side_light", place: "n_place", kind: "vec3f" },
-    Lookup { cube: Input::Lobe, light: "mirror_light", place: "reflected_place", kind: "vec4f" },
-    Lookup { cube: Input::Hilite, light: "hilite_light", place: "view_place", kind: "vec3f" },
-    Lookup { cube: Input::Reflected, light: "rough_light", place: "lobe_place", kind: "vec3f" },
-    Lookup { cube: Input::Glossy, light: "glossy_light", place: "lobe_place", kind: "vec3f" },
-];
+impl Lookup {
+    /// The lookups of a rule. Where its one parameter is a place on faces, and is called so, the cube's texels get what the
+    /// light gets, by the shares that the place gives them.
+    fn of(rule: &Rule) -> impl Iterator<Item = Self> {
+        let place = match (&rule.needs[..], rule.domain) {
+            (&[(name, "vec3f")], Domain::Fragment) if name.ends_with("_place") => Some(name),
+            _ => None,
+        };
+        let cubes =
+            Input::ALL.into_iter().filter(|cube| cube.faces().is_some_and(|faces| reads(rule, faces)));
+        cubes.flat_map(move |cube| {
+            rule.gives.iter().map(move |&(light, _)| Self { cube, light: (light, rule.returns), place })
+        })
+    }
+
+    /// The quantity that says where on the faces.
+    fn placed(&self) -> Result<&'static str, AdjointError> {
+        self.place.ok_or(AdjointError::Cube { cube: self.cube.name(), light: self.light.0 })
+    }
+}
+
+fn reads(rule: &Rule, faces: Resource) -> bool {
+    rule.reads.contains(&faces.name())
+}
 
 /// What is bound in group 1; the binding is the place in a module's list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -91,6 +109,7 @@ pub struct Adjoint {
     pub plan: Plan,
     /// The free columns, in the order of their tensor.
     pub columns: Vec<Column>,
+    lookups: Vec<Lookup>,
 }
 
 /// The model cannot be put in terms of those columns.
@@ -108,6 +127,17 @@ pub enum AdjointError {
          lobe instead."
     )]
     Lobe(&'static str),
+    /// A cube whose texels have no derivative.
+    #[error(
+        "No derivative by the cube `{cube}`: what makes {light} of it finds the place of its lookup itself, or looks it up for \
+         the texels of an atlas. Hold the cube, or give the rule the place alone, as a quantity whose name ends in `_place`."
+    )]
+    Cube {
+        /// The cube.
+        cube: &'static str,
+        /// What is looked up.
+        light: &'static str,
+    },
 }
 
 /// Whether a parameter acts through cubes that are inputs of their own.
@@ -146,7 +176,9 @@ impl Adjoint {
                 }
             }
         }
-        Ok(Self { plan, columns: columns.to_vec() })
+        let passes = plan.passes.iter().flat_map(|pass| &pass.plan.steps);
+        let lookups = plan.steps.iter().chain(passes).flat_map(|step| Lookup::of(step.rule)).collect();
+        Ok(Self { plan, columns: columns.to_vec(), lookups })
     }
 
     /// Whether the enabled effects read an input.
@@ -169,14 +201,17 @@ impl Adjoint {
             .collect()
     }
 
-    /// The lookups of a cube that the plan does.
-    #[must_use]
-    pub fn lookups(&self, cube: Input) -> Vec<(usize, Lookup)> {
-        let looked_up = |lookup: &Lookup| {
-            lookup.cube == cube
-                && self.plan.steps.iter().any(|step| step.rule.gives.iter().any(|(q, _)| *q == lookup.light))
-        };
-        LOOKUPS.into_iter().enumerate().filter(|(_, lookup)| looked_up(lookup)).collect()
+    /// The lookups of a cube that the plan does, each with its number among all.
+    pub fn lookups(&self, cube: Input) -> impl Iterator<Item = (usize, Lookup)> {
+        self.lookups.iter().copied().enumerate().filter(move |(_, lookup)| lookup.cube == cube)
+    }
+
+    /// Whether there is a derivative by an input.
+    ///
+    /// # Errors
+    /// When there is none by a cube.
+    pub fn moves(&self, input: Input) -> Result<(), AdjointError> {
+        self.lookups(input).try_for_each(|(_, lookup)| lookup.placed().map(|_| ()))
     }
 
     /// The module that shades.

@@ -182,8 +182,7 @@ impl Stage {
                     self.faces[at(cube) - at(Input::Irradiance)].as_ref().map_or(0, |faces| faces.size);
                 let lookups = self.adjoint.lookups(cube);
                 let lights: Vec<[&Buffer; 2]> = lookups
-                    .iter()
-                    .map(|(i, _)| [&scratch[&Binding::LightAdjoint(*i)], &scratch[&Binding::LightPlace(*i)]])
+                    .map(|(i, _)| [&scratch[&Binding::LightAdjoint(i)], &scratch[&Binding::LightPlace(i)]])
                     .collect();
                 self.scattering.encode(
                     self.shared.gpu(),

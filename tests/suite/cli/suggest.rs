@@ -66,6 +66,8 @@ fn lamps_are_found_where_targets_show_them() {
     // Shadows are worth less than the least gain here; a path tracer's gloss is nowhere in the targets.
     assert!(chosen.iter().any(|name| name == "lights"), "{chosen:?}\n{}", ran.out);
     assert!(!chosen.iter().any(|name| name == "fresnel"), "{chosen:?}\n{}", ran.out);
+    // Sets without them are what is asked for.
+    assert!(!format!("{}{}", ran.out, ran.err).contains("do not shine"), "{ran:?}");
     // The scene that it leaves has the lamps, and fits.
     let scene = sandbox.text("which/scene.toml");
     assert!(scene.contains("name = \"key\"") && scene.contains("\"lights\""), "{scene}");

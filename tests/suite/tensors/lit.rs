@@ -13,9 +13,11 @@ use skinfit::model::params::{Column, Param};
 use skinfit::prepare::Observed;
 use skinfit::samples::ViewSamples;
 use skinfit::scene::MapKind;
-use skinfit::tensor::{Inputs, Scatter, Shade, Shaded, SharedDevice};
+use skinfit::shader::term::register;
+use skinfit::tensor::{Input, Inputs, Scatter, Shade, Shaded, SharedDevice};
 
 use super::bench::{numbers, shared};
+use crate::added_term::term;
 use crate::lit::param;
 use crate::sky::{brighter, effect, head_changed, on_cpu};
 
@@ -100,52 +102,169 @@ fn loss(view: &ObservedView, task: &Task, image: &[f32]) -> (f64, Vec<f32>) {
     (loss / weights, slopes.into_iter().map(|slope| (slope / weights) as f32).collect())
 }
 
+/// Image and gradient on tensors beside those of the processor's engine.
+fn agree(shared: &SharedDevice, observed: &Observed, columns: &[Column], what: &str) {
+    let unknowns = columns.iter().copied().map(Unknown::Param).collect();
+    let task = Task { unknowns, ..observed.task() };
+    let (view, point) = (task.views[0].clone(), observed.start());
+    let engine = CpuEngine::new(task.clone()).unwrap();
+    let (shade, inputs) = operation(shared, observed, columns);
+    let image = numbers(shade.image(inputs.clone()).unwrap());
+    let planes = engine.image(0, &point);
+    let brightest = planes.iter().flatten().fold(0.0_f32, |most, x| most.max(*x));
+    let mut compared = 0;
+    for slot in (0..image.len() / 4).filter(|&slot| view.pixel_weight(slot) > 0.0) {
+        for c in 0..3 {
+            let (got, want) = (image[4 * slot + c], planes[c][slot]);
+            // Some hundred roundings of f32 each, of a lobe that is some ten times as bright at its peak.
+            assert!((got - want).abs() <= 1e-4 * want.abs() + 1e-5 * brightest, "{what}: {got} {want}");
+            compared += 1;
+        }
+    }
+    assert!(compared > 300, "{compared}");
+    let (want_loss, want) = engine.gradient(&point);
+    let (got_loss, slopes) = loss(&view, &task, &image);
+    // Sums over a thousand residuals of such an image.
+    assert!((got_loss - want_loss).abs() <= 1e-5 * want_loss, "{what}: {got_loss} {want_loss}");
+    let shape = [shade.slots(), 4];
+    let slopes = Tensor::<2>::from_data(TensorData::new(slopes, shape), shared.device());
+    let free = inputs.columns.clone().autodiff().require_grad();
+    let tracked = Inputs { columns: free.clone(), ..inputs };
+    let gradients = (shade.image(tracked).unwrap() * slopes.autodiff()).sum().backward();
+    let got = numbers(free.grad(&gradients).unwrap());
+    let most = want.iter().fold(0.0_f64, |most, slope| most.max(slope.abs()));
+    for ((column, got), want) in columns.iter().zip(got).zip(want) {
+        let name = Unknown::Param(*column).name();
+        // As between the engines (`slopes::EXACT`), of residuals that cancel ten times as far: the target is near.
+        let near = 1e-3 * want.abs() + 1e-5 * most;
+        assert!((f64::from(got) - want).abs() <= near, "{what}: {name}: {got} {want}");
+        assert!(want != 0.0, "{what}: {name} moves nothing");
+    }
+}
+
 #[test]
 fn lights_shadows_and_fresnel_move_tensors_as_they_move_the_processors_engine() {
     let Some(shared) = shared() else { return };
     for model in SpecularModel::ALL {
-        let observed = head(model);
-        let columns = columns(model);
-        let unknowns = columns.iter().copied().map(Unknown::Param).collect();
-        let task = Task { unknowns, ..observed.task() };
-        let (view, point) = (task.views[0].clone(), observed.start());
-        let engine = CpuEngine::new(task.clone()).unwrap();
-        let (shade, inputs) = operation(shared, &observed, &columns);
-        let image = numbers(shade.image(inputs.clone()).unwrap());
-        let planes = engine.image(0, &point);
-        let brightest = planes.iter().flatten().fold(0.0_f32, |most, x| most.max(*x));
-        let mut compared = 0;
-        for slot in (0..image.len() / 4).filter(|&slot| view.pixel_weight(slot) > 0.0) {
-            for c in 0..3 {
-                let (got, want) = (image[4 * slot + c], planes[c][slot]);
-                // Some hundred roundings of f32 each, of a lobe that is some ten times as bright at its peak.
-                assert!(
-                    (got - want).abs() <= 1e-4 * want.abs() + 1e-5 * brightest,
-                    "{model:?}: {got} {want}"
-                );
-                compared += 1;
-            }
-        }
-        assert!(compared > 300, "{compared}");
-        let (want_loss, want) = engine.gradient(&point);
-        let (got_loss, slopes) = loss(&view, &task, &image);
-        // Sums over a thousand residuals of such an image.
-        assert!((got_loss - want_loss).abs() <= 1e-5 * want_loss, "{model:?}: {got_loss} {want_loss}");
-        let shape = [shade.slots(), 4];
-        let slopes = Tensor::<2>::from_data(TensorData::new(slopes, shape), shared.device());
-        let free = inputs.columns.clone().autodiff().require_grad();
-        let tracked = Inputs { columns: free.clone(), ..inputs };
-        let gradients = (shade.image(tracked).unwrap() * slopes.autodiff()).sum().backward();
-        let got = numbers(free.grad(&gradients).unwrap());
-        let most = want.iter().fold(0.0_f64, |most, slope| most.max(slope.abs()));
-        for ((column, got), want) in columns.iter().zip(got).zip(want) {
-            let name = Unknown::Param(*column).name();
-            // As between the engines (`slopes::EXACT`), of residuals that cancel ten times as far: the target is near.
-            let near = 1e-3 * want.abs() + 1e-5 * most;
-            assert!((f64::from(got) - want).abs() <= near, "{model:?}: {name}: {got} {want}");
-            assert!(want != 0.0, "{model:?}: {name} moves nothing");
-        }
+        agree(shared, &head(model), &columns(model), &format!("{model:?}"));
     }
+}
+
+#[test]
+fn a_term_that_only_these_tests_know_moves_tensors_as_it_moves_the_processors_engine() {
+    let Some(shared) = shared() else { return };
+    let term = term();
+    let columns: Vec<Column> = term
+        .params
+        .iter()
+        .flat_map(|&param| Column::per_channel(param))
+        .chain([Column::tied(param("base_weight"))])
+        .collect();
+    let baked = head_changed(&[term.effect], |scene| {
+        let camera = &mut scene.views[0].camera;
+        (camera.width, camera.height) = (20, 20);
+        scene.params.set_rgb(term.params[0], [0.9, 0.6, 0.4]);
+        scene.params.set(term.params[1], 0.07);
+        scene.fit.free.clone_from(&columns);
+    });
+    let target = brighter(on_cpu(&baked));
+    let observed =
+        baked.with_scene(|scene| scene.views[0].target = Some(target)).sample().unwrap().observe().unwrap();
+    agree(shared, &observed, &columns, "an added term");
+}
+
+/// The image is linear in each cube, so that a difference of any length is its slope.
+#[test]
+fn every_cube_that_a_lit_scene_looks_up_gets_the_slope_that_differences_show() {
+    let Some(shared) = shared() else { return };
+    let observed = head(SpecularModel::Kelemen);
+    let (shade, inputs) = operation(shared, &observed, &[]);
+    let image = numbers(shade.image(inputs.clone()).unwrap());
+    // Any weights that do not repeat with the pixels.
+    let weights: Vec<f32> = (0..image.len()).map(|i| ((7 * i % 23) as f32 - 9.0) / 11.0).collect();
+    let tensor = |numbers: Vec<f32>, shape: [usize; 2]| {
+        Tensor::<2>::from_data(TensorData::new(numbers, shape), shared.device())
+    };
+    let cubes: [(Input, fn(&mut Inputs) -> &mut Tensor<2>); 3] = [
+        (Input::Irradiance, |inputs| &mut inputs.irradiance),
+        (Input::Reflected, |inputs| &mut inputs.reflected),
+        (Input::Glossy, |inputs| &mut inputs.glossy),
+    ];
+    for (input, of) in cubes {
+        assert!(shade.reads(input), "{input:?}");
+        let mut moved = inputs.clone();
+        let texels = of(&mut moved).clone();
+        let shape = [texels.dims()[0], 4];
+        let step: Vec<f32> = numbers(texels.clone())
+            .iter()
+            .enumerate()
+            .map(|(i, x)| x * ((5 * i % 17) as f32 / 9.0 - 0.6))
+            .collect();
+        *of(&mut moved) = texels.clone() + tensor(step.clone(), shape);
+        let stepped = numbers(shade.image(moved).unwrap());
+        let want: f64 =
+            (0..image.len()).map(|i| f64::from(weights[i]) * f64::from(stepped[i] - image[i])).sum();
+        let mut tracked = inputs.clone();
+        let free = texels.autodiff().require_grad();
+        *of(&mut tracked) = free.clone();
+        let loss = shade.image(tracked).unwrap() * tensor(weights.clone(), [shade.slots(), 4]).autodiff();
+        let slopes = numbers(free.grad(&loss.sum().backward()).unwrap());
+        let got: f64 =
+            slopes.iter().zip(&step).map(|(slope, step)| f64::from(*slope) * f64::from(*step)).sum();
+        // Differences of f32 images, each rounded to 1e-7 of values that the differences are parts of.
+        let size: f64 = image.iter().map(|x| f64::from(x.abs())).sum();
+        assert!((got - want).abs() <= 1e-3 * want.abs() + 1e-6 * size, "{input:?}: {got} {want}");
+        // A hundred times what rounding may be.
+        assert!(want.abs() > 1e-4 * size, "{input:?}: {want} of {size} moves too little to be seen");
+    }
+}
+
+/// Light of a cube that a rule finds by itself.
+const GLOW: &str = "\
+// Light of the far side, looked up by its direction.
+//
+// effect: glow, light of the far side
+// parameter: glow_weight = 0.5 in [0, inf), linear; weight of that light; these tests
+
+// gives: glow_light
+// when: glow
+// cost: 44
+// uses: cube, vector
+// reads: irradiance_faces
+fn glow_from_faces(n: vec3f) -> vec3f {
+    return sample_faces(irradiance_faces, irradiance_faces_size(), cube_place(-n)).rgb;
+}
+
+// gives: glow_part
+// adds: glow
+// when: glow
+// cost: 3
+fn glow_of_light(glow_light: vec3f, glow_weight: f32) -> vec3f {
+    return glow_weight * glow_light;
+}
+";
+
+#[test]
+fn a_cube_that_a_rule_looks_up_at_a_place_of_its_own_is_refused_where_it_is_tracked_and_not_elsewhere() {
+    let Some(shared) = shared() else { return };
+    let term = register("glow", GLOW).unwrap();
+    let columns = vec![Column::tied(term.params[0])];
+    let baked = head_changed(&[term.effect], |scene| {
+        let camera = &mut scene.views[0].camera;
+        (camera.width, camera.height) = (20, 20);
+        scene.fit.free.clone_from(&columns);
+    });
+    let target = brighter(on_cpu(&baked));
+    let observed =
+        baked.with_scene(|scene| scene.views[0].target = Some(target)).sample().unwrap().observe().unwrap();
+    agree(shared, &observed, &columns, "a cube looked up by direction");
+    let (shade, inputs) = operation(shared, &observed, &[]);
+    let irradiance = inputs.irradiance.clone().autodiff().require_grad();
+    let error = shade.image(Inputs { irradiance, ..inputs }).unwrap_err().to_string();
+    assert!(
+        error.contains("`irradiance`") && error.contains("glow_light") && error.contains("`_place`"),
+        "{error}"
+    );
 }
 
 #[test]

@@ -1,3 +1,5 @@
+//! How much of a light places see, of shapes for which that is known.
+
 use std::f64::consts::PI;
 
 use super::*;

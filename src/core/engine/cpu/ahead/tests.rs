@@ -1,3 +1,5 @@
+//! Plans that are compiled ahead: that what is compiled is what the rules print, and that it computes what the machine does.
+
 use std::fmt::Write as _;
 
 use rand::rngs::StdRng;

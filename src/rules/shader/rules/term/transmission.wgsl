@@ -33,16 +33,25 @@ fn unturned_inward_normal(into_skin: vec3f) -> vec3f {
     return into_skin;
 }
 
+// Where -N meets the cube.
+//
+// gives: far_place
+// when: transmission
+// cost: 22
+// uses: cube, vector
+fn place_of_far_side(into_environment: vec3f) -> vec3f {
+    return cube_place(into_environment);
+}
+
 // E_d(-N), filtered in the shader.
 //
 // gives: far_irradiance
 // when: transmission
-// cost: 44
+// cost: 22
 // uses: cube, vector
 // reads: irradiance_faces
-fn far_from_faces(into_environment: vec3f) -> vec3f {
-    let place: vec3f = cube_place(into_environment);
-    return sample_faces(irradiance_faces, irradiance_faces_size(), place).rgb;
+fn far_from_faces(far_place: vec3f) -> vec3f {
+    return sample_faces(irradiance_faces, irradiance_faces_size(), far_place).rgb;
 }
 
 // The same, filtered by the hardware.
