@@ -185,28 +185,31 @@ fn every_cube_that_a_lit_scene_looks_up_gets_the_slope_that_differences_show() {
     let tensor = |numbers: Vec<f32>, shape: [usize; 2]| {
         Tensor::<2>::from_data(TensorData::new(numbers, shape), shared.device())
     };
-    let cubes: [(Input, fn(&mut Inputs) -> &mut Tensor<2>); 3] = [
-        (Input::Irradiance, |inputs| &mut inputs.irradiance),
-        (Input::Reflected, |inputs| &mut inputs.reflected),
-        (Input::Glossy, |inputs| &mut inputs.glossy),
-    ];
-    for (input, of) in cubes {
+    let set = |inputs: &mut Inputs, input: Input, with: Tensor<2>| match input {
+        Input::Irradiance => inputs.irradiance = with,
+        Input::Reflected => inputs.reflected = with,
+        _ => inputs.glossy = with,
+    };
+    for (input, texels) in [
+        (Input::Irradiance, inputs.irradiance.clone()),
+        (Input::Reflected, inputs.reflected.clone()),
+        (Input::Glossy, inputs.glossy.clone()),
+    ] {
         assert!(shade.reads(input), "{input:?}");
         let mut moved = inputs.clone();
-        let texels = of(&mut moved).clone();
         let shape = [texels.dims()[0], 4];
         let step: Vec<f32> = numbers(texels.clone())
             .iter()
             .enumerate()
             .map(|(i, x)| x * ((5 * i % 17) as f32 / 9.0 - 0.6))
             .collect();
-        *of(&mut moved) = texels.clone() + tensor(step.clone(), shape);
+        set(&mut moved, input, texels.clone() + tensor(step.clone(), shape));
         let stepped = numbers(shade.image(moved).unwrap());
         let want: f64 =
             (0..image.len()).map(|i| f64::from(weights[i]) * f64::from(stepped[i] - image[i])).sum();
         let mut tracked = inputs.clone();
         let free = texels.autodiff().require_grad();
-        *of(&mut tracked) = free.clone();
+        set(&mut tracked, input, free.clone());
         let loss = shade.image(tracked).unwrap() * tensor(weights.clone(), [shade.slots(), 4]).autodiff();
         let slopes = numbers(free.grad(&loss.sum().backward()).unwrap());
         let got: f64 =
