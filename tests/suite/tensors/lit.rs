@@ -223,34 +223,34 @@ fn every_cube_that_a_lit_scene_looks_up_gets_the_slope_that_differences_show() {
 }
 
 /// Light of a cube that a rule finds by itself.
-const GLOW: &str = "\
+const BACKLIGHT: &str = "\
 // Light of the far side, looked up by its direction.
 //
-// effect: glow, light of the far side
-// parameter: glow_weight = 0.5 in [0, inf), linear; weight of that light; these tests
+// effect: backlight, light of the far side
+// parameter: backlight_weight = 0.5 in [0, inf), linear; weight of that light; these tests
 
-// gives: glow_light
-// when: glow
+// gives: backlight_found
+// when: backlight
 // cost: 44
 // uses: cube, vector
 // reads: irradiance_faces
-fn glow_from_faces(n: vec3f) -> vec3f {
+fn backlight_from_faces(n: vec3f) -> vec3f {
     return sample_faces(irradiance_faces, irradiance_faces_size(), cube_place(-n)).rgb;
 }
 
-// gives: glow_part
-// adds: glow
-// when: glow
+// gives: backlight_part
+// adds: backlight
+// when: backlight
 // cost: 3
-fn glow_of_light(glow_light: vec3f, glow_weight: f32) -> vec3f {
-    return glow_weight * glow_light;
+fn backlight_of_light(backlight_found: vec3f, backlight_weight: f32) -> vec3f {
+    return backlight_weight * backlight_found;
 }
 ";
 
 #[test]
 fn a_cube_that_a_rule_looks_up_at_a_place_of_its_own_is_refused_where_it_is_tracked_and_not_elsewhere() {
     let Some(shared) = shared() else { return };
-    let term = register("glow", GLOW).unwrap();
+    let term = register("backlight", BACKLIGHT).unwrap();
     let columns = vec![Column::tied(term.params[0])];
     let baked = head_changed(&[term.effect], |scene| {
         let camera = &mut scene.views[0].camera;
@@ -265,7 +265,7 @@ fn a_cube_that_a_rule_looks_up_at_a_place_of_its_own_is_refused_where_it_is_trac
     let irradiance = inputs.irradiance.clone().autodiff().require_grad();
     let error = shade.image(Inputs { irradiance, ..inputs }).unwrap_err().to_string();
     assert!(
-        error.contains("`irradiance`") && error.contains("glow_light") && error.contains("`_place`"),
+        error.contains("`irradiance`") && error.contains("backlight_found") && error.contains("`_place`"),
         "{error}"
     );
 }
