@@ -1,6 +1,6 @@
 //! A view's blocks of records: from what tapes yield to the sums of loss, gradient and normal equations.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::ops::Range;
 
 use super::file::File;
@@ -59,6 +59,8 @@ struct Compared {
     /// What the row of the value's derivative is scaled by, where residuals do not all count alike.
     scale: Column,
     residual: Column,
+    /// Their product, for the gradient alone.
+    scaled: Column,
 }
 
 /// The streams of a view, in the order of [`StreamOf`](super::streams::StreamOf).
@@ -340,12 +342,13 @@ impl ViewPass<'_> {
                 let mut base = 0;
                 for (c, channel) in channels.iter().enumerate() {
                     let compared = &scratch.compared[c];
-                    loss = loss + self.compare(simd, c, (shown, compared), first, count);
+                    let own = self.compare(simd, c, (shown, compared), first, count);
+                    loss = loss + own;
                     let sums = &mut sums[base..];
                     match wish {
                         PassOutputs::Loss => {}
                         PassOutputs::Gradient => {
-                            self.add_slope(simd, (c, channel), (shown, compared), count, sums);
+                            self.add_slope(simd, (c, channel), (shown, compared), (own, count), sums);
                         }
                         PassOutputs::Normal => {
                             self.weigh(simd, channel, scratch, c, count);
@@ -401,24 +404,29 @@ impl ViewPass<'_> {
         if unknown.is_some() { self.gain[channel] } else { 1.0 }
     }
 
-    /// Add J^T r of a channel, and after it r^T r.
+    /// Add J^T r of a channel whose loss is that, and after it r^T r.
     #[inline(always)]
     fn add_slope<S: Simd>(
         &self,
         simd: S,
         (c, channel): (usize, &ChannelColumns),
         (shown, compared): (&[Column], &Compared),
-        count: usize,
+        (loss, count): (Lanes<S>, usize),
         sums: &mut [Row],
     ) {
-        let mut factors = [Lanes::splat(simd, 0.0); BATCH];
         let last = channel.tangents.len();
         let mut squares = Lanes::of_row(simd, &sums[last]);
-        for i in 0..count {
-            let residual = load(simd, &compared.residual[i]);
-            factors[i] = if self.is_plain() { residual } else { residual * load(simd, &compared.scale[i]) };
-            squares = residual.mul_add(residual, squares);
-        }
+        let factors = if self.is_plain() {
+            squares = squares + loss;
+            &compared.residual
+        } else {
+            for i in 0..count {
+                let residual = load(simd, &compared.residual[i]);
+                store(&compared.scaled[i], residual * load(simd, &compared.scale[i]));
+                squares = residual.mul_add(residual, squares);
+            }
+            &compared.scaled
+        };
         squares.store(&mut sums[last]);
         let factors = &factors[..count];
         let (tiles, rest) = channel.tangents.as_chunks::<TILE>();
@@ -450,14 +458,15 @@ fn slopes<S: Simd, const N: usize>(
     simd: S,
     shown: &[Column],
     tangents: &[usize; N],
-    factors: &[Lanes<S>],
+    factors: &[Cell<Row>],
 ) -> [Lanes<S>; N] {
     let mut columns = [&shown[0]; N];
     for k in 0..N {
         columns[k] = &shown[tangents[k]];
     }
     let mut slopes = [Lanes::splat(simd, 0.0); N];
-    for (i, &factor) in factors.iter().enumerate() {
+    for (i, factor) in factors.iter().enumerate() {
+        let factor = load(simd, factor);
         for k in 0..N {
             slopes[k] = load(simd, &columns[k][i]).mul_add(factor, slopes[k]);
         }
