@@ -1,8 +1,8 @@
 //! Gram matrices of columns: J^T J, J^T r and r^T r of one channel in one sweep.
 
-use fearless_simd::f32x16;
-use fearless_simd::prelude::*;
-
+use super::lanes::{HalfLanes, Lanes};
+use super::part::{Part, shorter_than_rows};
+use crate::samples::LANES;
 use crate::samples::rows::Row;
 use crate::simd::Simd;
 
@@ -12,8 +12,8 @@ pub(super) trait Source: Copy {
     fn columns(&self) -> usize;
     /// How many rows each has.
     fn groups(&self) -> usize;
-    /// A group's row of a column.
-    fn load<S: Simd>(&self, simd: S, group: usize, column: usize) -> f32x16<S>;
+    /// A part of a group's row of a column.
+    fn load<S: Simd, R: Part<S>>(&self, simd: S, at: [usize; 3]) -> R;
 }
 
 /// Add the upper triangle of the Gram matrix of the columns to `sums`, lane by lane.
@@ -24,34 +24,46 @@ pub(super) trait Source: Copy {
 pub(super) fn add_gram<S: Simd>(simd: S, columns: impl Source, sums: &mut [Row]) {
     simd.vectorize(
         #[inline(always)]
-        || add_tiles(simd, columns, sums),
+        || {
+            // 4 x 4 products stay in the 32 registers of AVX-512, 3 x 4 halves in the 16 of AVX2.
+            if shorter_than_rows::<S>() {
+                (0..<HalfLanes<S> as Part<S>>::PARTS)
+                    .for_each(|part| add_tiles::<S, HalfLanes<S>, 3>(simd, columns, part, sums));
+            } else {
+                add_tiles::<S, Lanes<S>, 4>(simd, columns, 0, sums);
+            }
+        },
     );
 }
 
+/// By tiles of `ROWS` x 4 columns, those on the diagonal first of their row.
 #[inline(always)]
-fn add_tiles<S: Simd>(simd: S, columns: impl Source, sums: &mut [Row]) {
+fn add_tiles<S: Simd, R: Part<S>, const ROWS: usize>(
+    simd: S,
+    columns: impl Source,
+    part: usize,
+    sums: &mut [Row],
+) {
     let count = columns.columns();
-    // Tiles of 4 x 4 columns: 16 products for 8 loads.
     let mut i = 0;
     while i < count {
-        let rows = (count - i).min(4);
         let mut j = i;
         while j < count {
             let across = (count - j).min(4);
-            let tile = Tile { columns, i, j };
-            match (rows, across) {
-                (4, 4) if i == j => tile.add::<S, 4, 4, true>(simd, sums),
-                (4, 4) => tile.add::<S, 4, 4, false>(simd, sums),
-                (4, 3) => tile.add::<S, 4, 3, false>(simd, sums),
-                (4, 2) => tile.add::<S, 4, 2, false>(simd, sums),
-                (4, _) => tile.add::<S, 4, 1, false>(simd, sums),
-                (3, _) => tile.add::<S, 3, 3, true>(simd, sums),
-                (2, _) => tile.add::<S, 2, 2, true>(simd, sums),
-                _ => tile.add::<S, 1, 1, true>(simd, sums),
+            let tile = Tile { columns, part, i, j };
+            match (count - i >= ROWS, across, i == j) {
+                (true, 4, true) => tile.add::<S, R, ROWS, 4, true>(simd, sums),
+                (true, 4, false) => tile.add::<S, R, ROWS, 4, false>(simd, sums),
+                (true, 3, false) => tile.add::<S, R, ROWS, 3, false>(simd, sums),
+                (true, 2, false) => tile.add::<S, R, ROWS, 2, false>(simd, sums),
+                (true, 1, false) => tile.add::<S, R, ROWS, 1, false>(simd, sums),
+                (_, 3, _) => tile.add::<S, R, 3, 3, true>(simd, sums),
+                (_, 2, _) => tile.add::<S, R, 2, 2, true>(simd, sums),
+                _ => tile.add::<S, R, 1, 1, true>(simd, sums),
             }
             j += 4;
         }
-        i += 4;
+        i += ROWS;
     }
 }
 
@@ -64,37 +76,37 @@ pub(super) const fn pair(i: usize, j: usize, count: usize) -> usize {
 /// A rectangle of the Gram matrix: rows from `i`, columns from `j`.
 struct Tile<C: Source> {
     columns: C,
+    part: usize,
     i: usize,
     j: usize,
 }
 
 impl<C: Source> Tile<C> {
     #[inline(always)]
-    fn add<S: Simd, const ROWS: usize, const ACROSS: usize, const DIAGONAL: bool>(
+    fn add<S: Simd, R: Part<S>, const ROWS: usize, const ACROSS: usize, const DIAGONAL: bool>(
         &self,
         simd: S,
         sums: &mut [Row],
     ) {
-        let Self { columns, i, j } = *self;
-        let mut products = [[f32x16::splat(simd, 0.0); ACROSS]; ROWS];
+        let Self { columns, part, i, j } = *self;
+        let mut products = [[R::splat(simd, 0.0); ACROSS]; ROWS];
         for group in 0..columns.groups() {
-            let mut b = [f32x16::splat(simd, 0.0); ACROSS];
-            for k in 0..ACROSS {
-                b[k] = columns.load(simd, group, j + k);
-            }
+            let mut a = [R::splat(simd, 0.0); ROWS];
             for r in 0..ROWS {
-                let a = columns.load(simd, group, i + r);
-                let start = if DIAGONAL { r } else { 0 };
-                for k in start..ACROSS {
-                    products[r][k] = a.mul_add(b[k], products[r][k]);
+                a[r] = columns.load(simd, [group, i + r, part]);
+            }
+            for k in 0..ACROSS {
+                let b: R = columns.load(simd, [group, j + k, part]);
+                let end = if DIAGONAL { ROWS.min(k + 1) } else { ROWS };
+                for r in 0..end {
+                    products[r][k] = a[r].mul_add(b, products[r][k]);
                 }
             }
         }
         for r in 0..ROWS {
             let start = if DIAGONAL { r } else { 0 };
             for k in start..ACROSS {
-                let sum = &mut sums[pair(i + r, j + k, columns.columns())];
-                (f32x16::load_array_ref(simd, sum) + products[r][k]).store_array(sum);
+                products[r][k].add_to(&mut sums[pair(i + r, j + k, columns.columns())], part);
             }
         }
     }
@@ -103,7 +115,6 @@ impl<C: Source> Tile<C> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::samples::LANES;
     use crate::simd::{Level, levels, name};
     use crate::with_simd;
 
@@ -119,8 +130,8 @@ mod tests {
             3
         }
         #[inline(always)]
-        fn load<S: Simd>(&self, simd: S, group: usize, column: usize) -> f32x16<S> {
-            f32x16::load_array_ref(simd, &self.0[column][group])
+        fn load<S: Simd, R: Part<S>>(&self, simd: S, [group, column, part]: [usize; 3]) -> R {
+            R::of_part(simd, &self.0[column][group], part)
         }
     }
 

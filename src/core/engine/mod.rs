@@ -5,7 +5,8 @@
 //! - [`joint`]: scenes of different light as one objective
 //! - [`cpu`]: the engine on the processor
 //! - `gram`: columns to products; [`residual`]: the losses; [`pulls`]: where residuals stand in the images
-//! - [`lanes`]: sixteen f32 lanes as one number; `real_lanes`: its functions; `corners`: its lookups in cubes
+//! - [`lanes`]: f32 lanes as one number; `real_lanes`: its functions; `corners`: its lookups in cubes; `part`: rows of
+//!   them, or halves of rows
 //! - [`levels`]: what is computed in texels of the UV atlas, and what samples look up of it
 //! - [`rules`]: rules over samples in any kind of number; [`mod@reference`]: passes of them in f64, plainly
 //! - [`view`]: samples beside what was observed
@@ -17,6 +18,7 @@ mod gram;
 pub mod joint;
 pub mod lanes;
 pub mod levels;
+mod part;
 pub mod pulls;
 mod real_lanes;
 pub mod reference;

@@ -13,13 +13,16 @@
 //! - [`levels`]: passes over stored texels, as graphs
 //! - [`cut`]: what stays from pass to pass
 //! - [`steps`]: a graph evaluated node by node, in any kind of number
-//! - [`tape`]: instructions over registers, which `writer` finds; `order`: so that few of them are in use at once
+//! - [`tape`]: instructions over registers, which `writer` finds; `blocks`, `order`: so that few of them are in use at once
+//! - [`families`]: what is the same but for the member of a family; `rolled`: such instructions as a loop
 //! - [`evaluate`]: a tape run for one sample; [`mod@print`]: a tape as Rust
 
+mod blocks;
 pub mod cut;
 mod draft;
 mod error;
 pub mod evaluate;
+pub mod families;
 pub mod graph;
 mod level_then;
 pub mod levels;
@@ -27,6 +30,7 @@ pub mod lower;
 pub mod native;
 mod order;
 pub mod print;
+mod rolled;
 pub mod shading;
 pub mod steps;
 pub mod tape;

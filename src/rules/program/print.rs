@@ -1,8 +1,8 @@
 //! Tapes as Rust: what the compiler makes instructions of, once, where a machine would read a list again and again.
 //!
 //! The text is generic over [`Real`](crate::model::real::Real). Around it stand `lit(x)`, a constant; `u(k)`, a number
-//! that all samples share, by its place in [`Tape::uniform_values`]; `samples(k)`, field k of the tape; `kept(k)`, the k-th
-//! number that is kept; and `cubes`, those that are looked up. An output is left as soon as it is there: held to the end it
+//! that all samples share, by its place in [`Tape::uniform_values`]; `own(m, k)`, the k-th of those that are member m's own;
+//! `samples(k)`, field k of the tape; `kept(k)`, the k-th number that is kept; and `cubes`, those that are looked up. An output is left as soon as it is there: held to the end it
 //! would take a register from everything behind it. And texels are asked for only where all of them are known: a processor
 //! that works ahead then waits for many at once.
 
@@ -10,7 +10,7 @@ use std::fmt::Write as _;
 
 use super::cut::KEPT;
 use super::graph::{Binary, Native, Node, Unary};
-use super::tape::{CallOf, Instruction, Mend, Operand, Slot, Tape, Test};
+use super::tape::{CallOf, Instruction, Mend, Operand, Rolled, Slot, Tape, Test};
 use crate::shader::quantity::Resource;
 
 /// A tape's instructions as statements, each line indented by `indent`, in which `put` says how an output of that number is
@@ -25,8 +25,15 @@ pub fn statements(tape: &Tape, indent: &str, put: fn(usize, &str) -> String) -> 
     let values = tape.uniform_values(|_| 0.0);
     let constants =
         tape.uniforms.iter().zip(values).map(|(operand, value)| constant(operand).then_some(value)).collect();
-    let mut printer =
-        Printer { tape, constants, text: String::new(), indent: indent.to_owned(), ends: Vec::new() };
+    let mut printer = Printer {
+        tape,
+        constants,
+        text: String::new(),
+        indent: indent.to_owned(),
+        ends: Vec::new(),
+        rolled: tape.rolled.as_ref(),
+        in_loop: false,
+    };
     let outputs: Vec<String> = tape.outputs.iter().map(|slot| printer.slot(slot)).collect();
     let last = last_written(tape);
     let mut left = vec![false; outputs.len()];
@@ -36,7 +43,17 @@ pub fn statements(tape: &Tape, indent: &str, put: fn(usize, &str) -> String) -> 
         if ahead.first() == Some(&at) {
             ahead.iter().enumerate().for_each(|(k, &lookup)| printer.footprint(&ahead[..k], lookup));
         }
-        printer.instruction(at, instruction, ahead.contains(&at));
+        match printer.rolled.as_ref().map(|rolled| (rolled.range(), rolled.start + rolled.length)) {
+            Some((range, behind)) if range.contains(&at) => {
+                if at < behind {
+                    printer.of_loop(at, instruction);
+                }
+                if at + 1 < range.end {
+                    continue;
+                }
+            }
+            _ => printer.instruction(at, instruction, ahead.contains(&at)),
+        }
         for (k, slot) in tape.outputs.iter().enumerate() {
             let there = matches!(*slot, Slot::Register(register) if last[register] <= at);
             if there && !left[k] && printer.ends.iter().all(|&end| end == at + 1) {
@@ -58,6 +75,15 @@ fn last_written(tape: &Tape) -> Vec<usize> {
         written(instruction).for_each(|register| last[register] = at);
     }
     last
+}
+
+/// How many numbers that all samples share are each member's own in a tape's loop, where it has one.
+#[must_use]
+pub const fn own(tape: &Tape) -> Option<usize> {
+    match &tape.rolled {
+        Some(rolled) => Some(rolled.own),
+        None => None,
+    }
 }
 
 /// The registers that an instruction writes.
@@ -108,6 +134,9 @@ struct Printer<'a> {
     indent: String,
     /// The instructions before which blocks end that are seldom run.
     ends: Vec<usize>,
+    rolled: Option<&'a Rolled>,
+    /// Whether it prints the loop.
+    in_loop: bool,
 }
 
 impl Printer<'_> {
@@ -121,6 +150,47 @@ impl Printer<'_> {
             self.indent.truncate(self.indent.len() - 4);
             self.line("}");
         }
+    }
+
+    /// An instruction of a loop's first member, for every member.
+    fn of_loop(&mut self, at: usize, instruction: &Instruction) {
+        let Some(rolled) = self.rolled else { return };
+        let names = |registers: &[usize]| {
+            registers.iter().map(|register| format!("r{register}")).collect::<Vec<_>>().join(", ")
+        };
+        if at == rolled.start {
+            let members = rolled.left.len();
+            self.line(&format!("let mut made = [[lit(0.0); {}]; {members}];", rolled.left[0].len()));
+            self.line(&format!("for m in 0..{members} {{"));
+            self.indent.push_str("    ");
+            self.in_loop = true;
+        }
+        self.instruction(at, instruction, false);
+        if at + 1 == rolled.start + rolled.length {
+            self.line(&format!("made[m] = [{}];", names(&rolled.left[0])));
+            self.indent.truncate(self.indent.len() - 4);
+            self.line("}");
+            self.in_loop = false;
+            for (member, left) in rolled.left.iter().enumerate() {
+                self.line(&format!("let [{}] = made[{member}];", names(left)));
+            }
+        }
+    }
+
+    /// What reads a field; in a loop that of a member.
+    fn load(&self, at: usize, field: usize) -> String {
+        let of = |field: usize| {
+            let input = &self.tape.fields[field];
+            if input.name == KEPT { ("kept", input.component) } else { ("samples", field) }
+        };
+        let (from, place) = of(field);
+        let Some(rolled) = self.rolled.filter(|_| self.in_loop) else { return format!("{from}({place})") };
+        let of_member = |member: usize| match self.tape.instructions[at + member * rolled.length] {
+            Instruction::Load(field, _) => of(field).1,
+            _ => unreachable!("members' instructions are alike"),
+        };
+        let places: Vec<usize> = (0..rolled.left.len()).map(of_member).collect();
+        format!("{from}({places:?}[m])")
     }
 
     /// How an output is left.
@@ -166,6 +236,9 @@ impl Printer<'_> {
             Slot::Register(at) => format!("r{at}"),
             Slot::Uniform(at) => match self.constants[at] {
                 Some(value) => format!("lit({value:?})"),
+                None if self.in_loop && self.rolled.is_some_and(|rolled| at < rolled.own) => {
+                    format!("own(m, {at})")
+                }
                 None => format!("u({at})"),
             },
         }
@@ -178,11 +251,7 @@ impl Printer<'_> {
     fn instruction(&mut self, at: usize, instruction: &Instruction, ahead: bool) {
         let of = |slot: &Slot| self.slot(slot);
         let (expression, out) = match instruction {
-            Instruction::Load(field, out) => {
-                let input = &self.tape.fields[*field];
-                let kept = input.name == KEPT;
-                (if kept { format!("kept({})", input.component) } else { format!("samples({field})") }, out)
-            }
+            Instruction::Load(field, out) => (self.load(at, *field), out),
             Instruction::Unary(op, a, out) => (unary(*op, &of(a)), out),
             Instruction::Binary(op, a, b, out) => (binary(*op, &of(a), &of(b)), out),
             Instruction::MultiplyAdd([a, b, c], out) => {

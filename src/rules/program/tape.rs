@@ -4,6 +4,8 @@
 //! operation and comparisons part of the choice that they make; registers are used again as soon as their number is not
 //! needed any more.
 
+use std::ops::Range;
+
 use super::graph::{Binary, Graph, Id, Input, Native, Node, Unary, apply_binary, apply_unary};
 use super::native;
 
@@ -95,6 +97,7 @@ pub struct Tape {
     pub outputs: Vec<Slot>,
     pub(super) graph: Graph,
     pub(super) uniforms: Vec<Operand>,
+    pub(super) rolled: Option<Rolled>,
 }
 
 /// An operand before it has a place: a node, or the reciprocal of one.
@@ -104,6 +107,35 @@ pub(super) enum Operand {
     ReciprocalOf(Id),
     /// Where a unit vector has a direction, by the node of its call.
     FlagOf(Id),
+}
+
+impl Operand {
+    /// The node that it is of.
+    pub(super) const fn id(self) -> Id {
+        match self {
+            Self::Of(id) | Self::ReciprocalOf(id) | Self::FlagOf(id) => id,
+        }
+    }
+}
+
+/// Instructions that are the same for each member of a family, one member's after the other's, each with numbers of its own.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Rolled {
+    /// The first of them.
+    pub(super) start: usize,
+    /// How many a member has.
+    pub(super) length: usize,
+    /// For each member the registers of what is read after the last of them, of the same instructions of each.
+    pub(super) left: Vec<Vec<usize>>,
+    /// How many numbers that all samples share are a member's own: they stand first, one member's after the other's.
+    pub(super) own: usize,
+}
+
+impl Rolled {
+    /// The instructions of all members.
+    pub(super) fn range(&self) -> Range<usize> {
+        self.start..self.start + self.length * self.left.len()
+    }
 }
 
 impl Tape {

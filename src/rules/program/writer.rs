@@ -5,10 +5,12 @@
 
 use std::collections::HashMap;
 
+use super::blocks::in_order;
 use super::draft::{Draft, Kind};
+use super::families::{Family, families};
 use super::graph::{Binary, Call, Graph, Id, Native, Node, Unary};
-use super::order::Dependencies;
-use super::tape::{Operand, Slot, Tape};
+use super::rolled::bodies;
+use super::tape::{Operand, Rolled, Slot, Tape};
 
 /// Instructions over nodes, whose registers are not yet known.
 struct Writer<'a> {
@@ -27,6 +29,7 @@ struct Writer<'a> {
     reciprocals: Vec<bool>,
     drafts: Vec<Draft>,
     uniforms: Vec<Operand>,
+    rolled: Option<Rolled>,
 }
 
 impl Tape {
@@ -40,11 +43,23 @@ impl Tape {
 
     /// The same in an order in which few numbers wait at once, where many would: so that a compiler finds registers for
     /// most of them. A machine with an accumulator has none to find, and prefers the order of [`Self::new`].
+    ///
+    /// What is the same for several members of a family stands together, so that it can be printed once; `kept` says what the
+    /// numbers are of that are read as [`KEPT`](super::cut::KEPT).
     #[must_use]
-    pub fn with_few_registers(graph: &Graph, outputs: &[Id]) -> Self {
+    pub fn with_few_registers(graph: &Graph, outputs: &[Id], kept: &[Family]) -> Self {
         let mut writer = Writer::new(graph, outputs);
         writer.write(outputs);
-        writer.drafts = in_order(writer.drafts, outputs);
+        let drafts = std::mem::take(&mut writer.drafts);
+        let bodies = bodies(graph, &drafts, &families(graph, kept), &writer.varies);
+        let wanted: Vec<Operand> = outputs.iter().map(|&id| Operand::Of(id)).collect();
+        (writer.drafts, writer.rolled) = in_order(drafts, &wanted, bodies.as_ref());
+        if let (Some(bodies), Some(rolled)) = (bodies, &mut writer.rolled) {
+            rolled.own = bodies.uniforms.len();
+            let members = 0..rolled.left.len();
+            let of = |member: usize| bodies.uniforms.iter().map(move |of_all| of_all[member]);
+            writer.uniforms = members.flat_map(of).collect();
+        }
         writer.finish(outputs)
     }
 }
@@ -80,6 +95,7 @@ impl<'a> Writer<'a> {
             reciprocals: vec![false; graph.len()],
             drafts: Vec::new(),
             uniforms: Vec::new(),
+            rolled: None,
         }
     }
 
@@ -275,6 +291,13 @@ impl<'a> Writer<'a> {
         let drafts = std::mem::take(&mut self.drafts);
         let mut registers = Registers::default();
         let mut instructions = Vec::new();
+        let mut rolled = self.rolled.take();
+        let left = rolled.as_ref().map(|rolled| left_by(&drafts, rolled, &last)).unwrap_or_default();
+        for operand in left.iter().flatten() {
+            // It stays to the end of the loop, whichever member's it is.
+            let end = rolled.as_ref().map_or(0, |rolled| rolled.range().end);
+            last.entry(*operand).and_modify(|last| *last = end.max(*last)).or_insert(end);
+        }
         for (at, draft) in drafts.iter().enumerate() {
             let reads: Vec<Slot> = draft.reads.iter().map(|&o| self.slot(o, &registers)).collect();
             // A call reads its arguments again and again while it writes.
@@ -293,6 +316,12 @@ impl<'a> Writer<'a> {
                 at,
                 &draft.writes.iter().map(|&o| (o, *last.get(&o).unwrap_or(&at))).collect(),
             );
+            if let Some(rolled) = rolled.as_mut().filter(|rolled| rolled.range().end == at + 1) {
+                rolled.left = left
+                    .iter()
+                    .map(|of| of.iter().map(|operand| registers.places[operand]).collect())
+                    .collect();
+            }
         }
         let outputs = outputs.iter().map(|&id| self.slot(Operand::Of(id), &registers)).collect();
         Tape {
@@ -303,6 +332,7 @@ impl<'a> Writer<'a> {
             outputs,
             graph: self.graph.clone(),
             uniforms: self.uniforms,
+            rolled,
         }
     }
 
@@ -319,60 +349,17 @@ impl<'a> Writer<'a> {
     }
 }
 
-/// Numbers that may wait in the order of outputs: twice as many as processors have registers of 512 bits.
-const FEW: usize = 64;
-
-/// Instructions in an order in which few registers are in use, where many would be.
-fn in_order(drafts: Vec<Draft>, outputs: &[Id]) -> Vec<Draft> {
-    // A unit vector and what stands in for it stay together.
-    let mut blocks: Vec<Vec<Draft>> = Vec::new();
-    let mut drafts = drafts.into_iter();
-    while let Some(draft) = drafts.next() {
-        let more = if let Kind::Call { skip, .. } = draft.kind { skip.unwrap_or(0) } else { 0 };
-        blocks.push(std::iter::once(draft).chain(drafts.by_ref().take(more)).collect());
-    }
-    let steps = steps(&blocks, outputs);
-    let as_they_stand: Vec<usize> = (0..blocks.len()).collect();
-    let order = if steps.pressure(&as_they_stand) > FEW { steps.ordered() } else { as_they_stand };
-    let mut blocks: Vec<Option<Vec<Draft>>> = blocks.into_iter().map(Some).collect();
-    order.into_iter().filter_map(|block| blocks[block].take()).flatten().collect()
-}
-
-/// What blocks of instructions read and write for others.
-fn steps(blocks: &[Vec<Draft>], outputs: &[Id]) -> Dependencies {
-    let written =
-        blocks.iter().enumerate().flat_map(|(at, block)| block[0].writes.iter().map(move |&o| (o, at)));
-    let writer: HashMap<Operand, usize> = written.collect();
-    let mut numbers: HashMap<Operand, usize> = HashMap::new();
-    let mut steps = Dependencies { after: vec![Vec::new(); blocks.len()], ..Dependencies::default() };
-    for (at, block) in blocks.iter().enumerate() {
-        let own: Vec<Operand> = block.iter().flat_map(|draft| &draft.writes).copied().collect();
-        let mut reads: Vec<usize> = Vec::new();
-        for operand in block.iter().flat_map(|draft| &draft.reads).filter(|operand| !own.contains(operand)) {
-            // What is the same for all samples has no register.
-            if writer.contains_key(operand) {
-                let next = numbers.len();
-                reads.push(*numbers.entry(*operand).or_insert(next));
-            }
-        }
-        reads.sort_unstable();
-        reads.dedup();
-        steps.reads.push(reads);
-        // What is written where it stands in, too, is written for all afterwards.
-        for operand in &own[block[0].writes.len()..] {
-            if let Some(&later) = writer.get(operand).filter(|&&later| later != at) {
-                steps.after[later].push(at);
-            }
-        }
-    }
-    let wanted = outputs.iter().map(|&id| Operand::Of(id)).filter(|operand| writer.contains_key(operand));
-    for operand in wanted {
-        let next = numbers.len();
-        steps.outputs.push(*numbers.entry(operand).or_insert(next));
-    }
-    let known = |operand: &Operand| numbers.get(operand).copied();
-    steps.writes = blocks.iter().map(|block| block[0].writes.iter().filter_map(known).collect()).collect();
-    steps
+/// For each member of a loop what is read behind it, or of another member is.
+fn left_by(drafts: &[Draft], rolled: &Rolled, last: &HashMap<Operand, usize>) -> Vec<Vec<Operand>> {
+    let of_member = |member: usize| {
+        let own = &drafts[rolled.start + member * rolled.length..][..rolled.length];
+        own.iter().flat_map(|draft| &draft.writes).copied().collect::<Vec<Operand>>()
+    };
+    let all: Vec<Vec<Operand>> = (0..rolled.left.len()).map(of_member).collect();
+    let end = rolled.range().end;
+    let read = |&k: &usize| all.iter().any(|of| last.get(&of[k]).is_some_and(|&last| last >= end));
+    let left: Vec<usize> = (0..all[0].len()).filter(read).collect();
+    all.iter().map(|of| left.iter().map(|&k| of[k]).collect()).collect()
 }
 
 /// The nodes that every sample needs: fallbacks are not, nor what only they are made of.

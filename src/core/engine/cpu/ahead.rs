@@ -16,6 +16,8 @@ use fearless_simd::SimdBase;
 
 use super::block::Block;
 use super::fitted::Fitted;
+use crate::engine::lanes::{HalfLanes, Lanes};
+use crate::engine::part::shorter_than_rows;
 use crate::model::choices::{Choices, SpecularMap, SpecularModel, SpecularVisibility};
 use crate::model::effects::{Effect, Effects, Form, Silhouette};
 use crate::model::evaluate::Setup;
@@ -255,7 +257,12 @@ pub(super) fn compiled_for(level: Level) -> bool {
 #[inline(always)]
 pub(super) fn run<S: Simd>(tape: usize, simd: S, block: Block<'_>) -> bool {
     if Functions::<S>::COMPILED {
-        tapes::run(tape, simd, block);
+        // Functions with a loop are long: numbers in several registers would leave too few.
+        if shorter_than_rows::<S>() {
+            tapes::run::<S, HalfLanes<S>>(tape, simd, block);
+        } else {
+            tapes::run::<S, Lanes<S>>(tape, simd, block);
+        }
     }
     Functions::<S>::COMPILED
 }

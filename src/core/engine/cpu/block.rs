@@ -3,7 +3,7 @@
 use prefetch_index::prefetch_index;
 
 use super::streams::{AHEAD, Column, Stream, StreamOf, first_neutral};
-use crate::engine::lanes::Lanes;
+use crate::engine::part::Part;
 use crate::model::cube::Cube;
 use crate::model::real::Real;
 use crate::samples::rows::{Row, prefetch_rows};
@@ -78,11 +78,11 @@ impl<'a> Block<'a> {
         rows[(self.first + i) * stride..].first_chunk().unwrap_or(&[Row::ZERO; N])
     }
 
-    /// A field's number, of the record whose row that is. Asks for a later record's as well.
+    /// A part of a field's number, of the record whose row that is. Asks for a later record's as well.
     #[inline(always)]
-    pub(super) fn number<S: Simd>(&self, simd: S, field: &[Row], at: usize) -> Lanes<S> {
+    pub(super) fn number<S: Simd, R: Part<S>>(&self, simd: S, field: &[Row], at: usize, part: usize) -> R {
         prefetch_index(field, at + AHEAD * self.stride());
-        Lanes::of_row(simd, &field[at])
+        R::of_part(simd, &field[at], part)
     }
 
     /// The outputs' columns, where there are as many.

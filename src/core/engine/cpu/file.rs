@@ -2,10 +2,9 @@
 //!
 //! A register's rows stand together, so that a tape's file stays in the nearest cache.
 
-use std::cell::Cell;
-
 use super::program::Bound;
 use super::streams::Column;
+use crate::engine::part::RowCell;
 use crate::samples::LANES;
 use crate::samples::rows::Row;
 
@@ -13,7 +12,7 @@ use crate::samples::rows::Row;
 pub(super) const WIDTH: usize = 4;
 
 /// The rows of a register.
-pub(super) type Rows = [Cell<Row>; WIDTH];
+pub(super) type Rows = [RowCell; WIDTH];
 
 /// Registers, the numbers that all samples share, each in all lanes, and the outputs.
 #[derive(Debug, Default)]
@@ -33,13 +32,13 @@ impl File {
             self.uniforms.clear();
             self.uniforms.extend(bound.uniforms.iter().map(|&value| Row::of([value; LANES])));
             self.nobody = code.registers;
-            self.registers.resize_with(code.registers + 1, || std::array::from_fn(|_| Cell::new(Row::ZERO)));
+            self.registers.resize_with(code.registers + 1, Rows::default);
             for &(register, uniform) in &code.filled {
-                self.registers[register].iter().for_each(|cell| cell.set(self.uniforms[uniform]));
+                self.registers[register].iter().for_each(|cell| cell.set(*self.uniforms[uniform]));
             }
         }
         let outputs = bound.program.tape.outputs.len();
-        self.columns.resize_with(outputs, || std::array::from_fn(|_| Cell::new(Row::ZERO)));
+        self.columns.resize_with(outputs, Column::default);
     }
 
     /// The rows of each output.

@@ -61,7 +61,7 @@ impl CpuEngine {
                     machine::run(simd, &bound, file, &streams, chunk * size + k * BATCH, count);
                     for (output, column) in file.columns().iter().enumerate() {
                         for i in 0..count {
-                            rows[i * stride + output] = column[i].get();
+                            rows[i * stride + output] = Row::of(column[i].get());
                         }
                     }
                 }

@@ -119,14 +119,14 @@ fn run_each<S: Simd>(
                     let start = first * stride + place;
                     let now = &rows[start..start + (WIDTH - 1) * stride + 1];
                     for i in 0..WIDTH {
-                        out[i].set(now[i * stride]);
+                        out[i].set(*now[i * stride]);
                         // A few lines with each field, one after the other: not all of a block at once.
                         prefetch_index(rows, (first + AHEAD) * stride + place * WIDTH + i);
                     }
                 } else {
                     for i in 0..WIDTH {
                         let record = first + i.min(count - 1);
-                        out[i].set(rows[record * stride + place]);
+                        out[i].set(*rows[record * stride + place]);
                     }
                 }
             }

@@ -11,6 +11,7 @@ use crate::engine::Unknown;
 use crate::engine::levels::LevelMaker;
 use crate::model::params::{Channels, Param, Params};
 use crate::program::cut::{KEPT, cut};
+use crate::program::families::{Family, families};
 use crate::program::graph::{Graph, Id, Input, Node};
 use crate::program::levels::LevelProgram;
 use crate::program::lower::Natives;
@@ -101,7 +102,7 @@ impl Tapes {
         held: impl Fn(&str) -> bool,
         keep: bool,
     ) -> Result<Self, ShadingError> {
-        Self::made(facts, free, channels, held, keep, Tape::new)
+        Self::made(facts, free, channels, held, keep, |graph, outputs, _| Tape::new(graph, outputs))
     }
 
     fn made(
@@ -110,7 +111,7 @@ impl Tapes {
         channels: usize,
         held: impl Fn(&str) -> bool,
         keep: bool,
-        tape: fn(&Graph, &[Id]) -> Tape,
+        tape: fn(&Graph, &[Id], &[Family]) -> Tape,
     ) -> Result<Self, ShadingError> {
         let seeds: Vec<Seed> = free.iter().map(|&param| Seed::of_param(param)).collect();
         let stand_in = |field: &str| if held(field) { None } else { neutral(field) };
@@ -144,10 +145,12 @@ impl Tapes {
             };
             columns.push(tangent.iter().map(&mut column).collect());
         }
+        let of_all = families(&graph, &[]);
+        let kept: Vec<Family> = cut.kept.iter().map(|&id| of_all[id.index()]).collect();
         Ok(Self {
-            keep: tape(&graph, &cut.kept),
-            value: tape(&cut.graph, &moved[..channels]),
-            moved: tape(&cut.graph, &moved),
+            keep: tape(&graph, &cut.kept, &[]),
+            value: tape(&cut.graph, &moved[..channels], &kept),
+            moved: tape(&cut.graph, &moved, &kept),
             columns,
             levels: shading.levels,
         })

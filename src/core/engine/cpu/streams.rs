@@ -1,12 +1,8 @@
 //! What tapes read and write: streams of records, and columns of outputs.
 
-use std::cell::Cell;
-
-use fearless_simd::f32x16;
-use fearless_simd::prelude::*;
-
 use crate::engine::gram::Source as GramSource;
 use crate::engine::lanes::Lanes;
+use crate::engine::part::{Part, RowCell};
 use crate::samples::LANES;
 use crate::samples::rows::Row;
 use crate::simd::Simd;
@@ -20,7 +16,7 @@ pub(super) const SHORT_BATCH: usize = 8;
 pub(super) const AHEAD: usize = 8;
 
 /// The rows of an output. One more than are used: so the first rows of all columns are spread over the sets of a cache.
-pub(super) type Column = [Cell<Row>; BATCH + 1];
+pub(super) type Column = [RowCell; BATCH + 1];
 
 /// The streams that tapes read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,15 +56,13 @@ pub(super) const fn first_neutral(rows: &[Row], which: usize) -> usize {
 }
 
 #[inline(always)]
-pub(super) fn load<S: Simd>(simd: S, cell: &Cell<Row>) -> Lanes<S> {
+pub(super) fn load<S: Simd>(simd: S, cell: &RowCell) -> Lanes<S> {
     Lanes::of_row(simd, &cell.get())
 }
 
 #[inline(always)]
-pub(super) fn store<S: Simd>(cell: &Cell<Row>, value: Lanes<S>) {
-    let mut row = Row::ZERO;
-    value.store(&mut row);
-    cell.set(row);
+pub(super) fn store<S: Simd>(cell: &RowCell, value: Lanes<S>) {
+    cell.set(value.to_array());
 }
 
 /// Columns as the Gram matrix reads them.
@@ -88,7 +82,7 @@ impl GramSource for FileColumns<'_> {
         self.groups
     }
     #[inline(always)]
-    fn load<S: Simd>(&self, simd: S, group: usize, column: usize) -> f32x16<S> {
-        f32x16::load_array_ref(simd, &self.columns[column][group].get())
+    fn load<S: Simd, R: Part<S>>(&self, simd: S, [group, column, part]: [usize; 3]) -> R {
+        R::get(simd, &self.columns[column][group], part)
     }
 }

@@ -1,6 +1,6 @@
 //! A view's blocks of records: from what tapes yield to the sums of loss, gradient and normal equations.
 
-use std::cell::{Cell, RefCell};
+use std::cell::RefCell;
 use std::ops::Range;
 
 use super::file::File;
@@ -12,6 +12,7 @@ use super::sums::{Sums, fold};
 use crate::engine::gram::add_gram;
 use crate::engine::lanes::Lanes;
 use crate::engine::levels::{Corners, Finder};
+use crate::engine::part::RowCell;
 use crate::engine::residual::Residuals;
 use crate::engine::view::ObservedView;
 use crate::engine::{BLOCK, PassOutputs};
@@ -219,7 +220,7 @@ impl ViewPass<'_> {
         let Scratch { file, pixels, .. } = scratch;
         let surface = &self.view.samples.surface;
         let starts = &self.view.samples.group_start;
-        self.read.iter().flat_map(|&output| &pixels[output][..count]).for_each(|cell| cell.set(Row::ZERO));
+        self.read.iter().flat_map(|&output| &pixels[output][..count]).for_each(|cell| cell.set([0.0; LANES]));
         let (mut record, end) = (starts[first] as usize, starts[first + count] as usize);
         let mut group = first;
         while record < end {
@@ -301,8 +302,8 @@ impl ViewPass<'_> {
         i: usize,
     ) -> Row {
         let compared = &scratch.compared[c];
-        let Some(&tangent) = channel.tangents.get(column) else { return compared.residual[i].get() };
-        let mut row = scratch.shown()[tangent][i].get();
+        let Some(&tangent) = channel.tangents.get(column) else { return Row::of(compared.residual[i].get()) };
+        let mut row = Row::of(scratch.shown()[tangent][i].get());
         if self.is_plain() {
             return row;
         }
@@ -458,7 +459,7 @@ fn slopes<S: Simd, const N: usize>(
     simd: S,
     shown: &[Column],
     tangents: &[usize; N],
-    factors: &[Cell<Row>],
+    factors: &[RowCell],
 ) -> [Lanes<S>; N] {
     let mut columns = [&shown[0]; N];
     for k in 0..N {

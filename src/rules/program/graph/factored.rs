@@ -7,6 +7,7 @@ use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
 use super::{Binary, Graph, Id, Node, Unary};
+use crate::program::families::numbered;
 
 /// A product, added or taken away.
 #[derive(Clone, Debug)]
@@ -35,6 +36,8 @@ struct Factoring<'a, M> {
 struct MadeOf {
     varies: bool,
     moves: bool,
+    /// Of a member of a family.
+    of_member: bool,
 }
 
 impl Graph {
@@ -89,7 +92,8 @@ impl<M: Fn(&Graph, Id) -> bool> Factoring<'_, M> {
         self.moved[id.index()] = Some(made);
     }
 
-    /// The products that a sum adds up, in their order. A sum within it that is used elsewhere too is one number.
+    /// The products that a sum adds up, in their order; those of a family's members, which come last, in one that is the same
+    /// for each of them. A sum within it that is used elsewhere too is one number.
     fn addends(&mut self, sum: Id) -> Vec<Addend> {
         let (mut addends, mut open) = (Vec::new(), vec![(sum, false)]);
         while let Some((id, negative)) = open.pop() {
@@ -102,13 +106,19 @@ impl<M: Fn(&Graph, Id) -> bool> Factoring<'_, M> {
                 _ => addends.push(self.addend(id, negative)),
             }
         }
+        // Those of no member have one key, and keep their order.
+        addends.sort_by_cached_key(|Addend { factors, shared, .. }| {
+            let of_member = factors.iter().chain([shared]).any(|&id| self.made_of(id).of_member);
+            of_member.then(|| (factors.clone(), *shared))
+        });
         addends
     }
 
     /// A product's factors. A square is one: what is raised to a power is multiplied no more often than it was.
     fn addend(&mut self, product: Id, negative: bool) -> Addend {
-        let shared = self.new.constant(1.0);
-        let (mut addend, mut open) = (Addend { negative, factors: Vec::new(), shared }, vec![product]);
+        let one = self.new.constant(1.0);
+        let (mut addend, mut open) = (Addend { negative, factors: Vec::new(), shared: one }, vec![product]);
+        let mut shared = Vec::new();
         while let Some(id) = open.pop() {
             match self.old.node(id) {
                 Node::Unary(Unary::Negate, a) => {
@@ -121,12 +131,17 @@ impl<M: Fn(&Graph, Id) -> bool> Factoring<'_, M> {
                     if self.made_of(factor).varies {
                         addend.factors.push(factor);
                     } else {
-                        addend.shared = self.new.binary(Binary::Multiply, addend.shared, factor);
+                        shared.push(factor);
                     }
                 }
             }
         }
-        addend.factors.sort_unstable();
+        // What is of no member stands first, in the products of each.
+        addend.factors.sort_by_key(|&id| (self.made_of(id).of_member, id));
+        if shared.iter().any(|&id| self.made_of(id).of_member) {
+            shared.sort_by_key(|&id| (self.made_of(id).of_member, id));
+        }
+        addend.shared = shared.into_iter().fold(one, |a, b| self.new.binary(Binary::Multiply, a, b));
         addend
     }
 
@@ -134,12 +149,18 @@ impl<M: Fn(&Graph, Id) -> bool> Factoring<'_, M> {
     fn made_of(&mut self, id: Id) -> MadeOf {
         for at in self.made_of.len()..self.new.len() {
             let (graph, of) = (&self.new, Id(at as u32));
-            let mut made = MadeOf { varies: false, moves: (self.moves)(graph, of) };
+            let mut made = MadeOf { moves: (self.moves)(graph, of), ..MadeOf::default() };
             made.varies = matches!(graph.node(of), Node::Field(_)) || graph.looked_up(of).is_some();
+            made.of_member = match graph.node(of) {
+                Node::Field(at) => numbered(&graph.fields[at as usize].name).is_some(),
+                Node::Uniform(at) => numbered(&graph.uniforms[at as usize].name).is_some(),
+                _ => false,
+            };
             for operand in graph.operands(of) {
                 let operand = self.made_of[operand.index()];
                 made.varies |= operand.varies;
                 made.moves |= operand.moves;
+                made.of_member |= operand.of_member;
             }
             self.made_of.push(made);
         }

@@ -5,7 +5,9 @@
 pub struct Id(pub(in crate::program) u32);
 
 impl Id {
-    pub(in crate::program) const fn index(self) -> usize {
+    /// Its place.
+    #[must_use]
+    pub const fn index(self) -> usize {
         self.0 as usize
     }
 }

@@ -1,13 +1,15 @@
 // Printed from the rules by the test beside it. Do not edit.
 //
-// Each function runs one tape over a block of records, a record of sixteen samples at a time: `samples` are fields of
-// stored samples, `kept` numbers that no free parameter moves, `u` numbers that all samples share.
+// Each function runs one tape over a block of records, a record's sixteen samples at a time, or (`R`) a part of them: `samples`
+// are fields of stored samples, `kept` numbers that no free parameter moves, `u` numbers that all samples share, `own` those of
+// them that are a light's own.
 
 use super::super::block::{Block, along};
-use super::super::streams::{BATCH, store};
+use super::super::streams::BATCH;
 use crate::engine::lanes::Lanes;
+use crate::engine::part::Part;
 use crate::model::cube::CubePoint;
-use crate::model::real::{Real, select};
+use crate::model::real::select;
 use crate::program::evaluate::{binary, unary};
 use crate::program::graph::{Binary, Unary};
 use crate::program::native::Unit;
@@ -65,91 +67,92 @@ pub(super) const KEYS: [u64; 56] = [
     0xb3aeeeacc0eb0fbe,
     0x80f8d2a9f1f470c4,
     0x1bc46e2fbf25570d,
-    0x8e3c9d6fb043a5a1,
-    0xb558b7ca4a4a2e4e,
+    0x5194a043b7acbc22,
+    0x8c0b70fd26297230,
     0x6cd1121b71ffafce,
-    0xec66d31d40d91eff,
-    0x9d051172c008a51d,
+    0x48776085104e5b12,
+    0xe62d9b9b78aff887,
 ];
 
 #[inline(always)]
-pub(super) fn run<S: Simd>(tape: usize, simd: S, block: Block<'_>) {
+pub(super) fn run<S: Simd, R: Part<S>>(tape: usize, simd: S, block: Block<'_>) {
     match tape {
-        0 => surface_keep(simd, block),
-        1 => surface_value(simd, block),
-        2 => surface_moved(simd, block),
-        3 => surface_lobe_keep(simd, block),
-        4 => surface_lobe_value(simd, block),
-        5 => surface_lobe_moved(simd, block),
-        6 => surface_strength_keep(simd, block),
-        7 => surface_strength_value(simd, block),
-        8 => surface_strength_moved(simd, block),
-        9 => surface_strength_lobe_moved(simd, block),
-        10 => surface_all_value(simd, block),
-        11 => surface_all_moved(simd, block),
-        12 => bumped_keep(simd, block),
-        13 => bumped_value(simd, block),
-        14 => bumped_moved(simd, block),
-        15 => bumped_lobe_keep(simd, block),
-        16 => bumped_lobe_value(simd, block),
-        17 => bumped_lobe_moved(simd, block),
-        18 => bumped_strength_keep(simd, block),
-        19 => bumped_strength_value(simd, block),
-        20 => bumped_strength_moved(simd, block),
-        21 => bumped_strength_lobe_moved(simd, block),
-        22 => smooth_keep(simd, block),
-        23 => smooth_lobe_keep(simd, block),
-        24 => hazy_keep(simd, block),
-        25 => hazy_value(simd, block),
-        26 => hazy_moved(simd, block),
-        27 => hazy_lobe_value(simd, block),
-        28 => hazy_lobe_moved(simd, block),
-        29 => hazy_strength_value(simd, block),
-        30 => hazy_strength_moved(simd, block),
-        31 => hazy_strength_lobe_moved(simd, block),
-        32 => hazy_bumped_keep(simd, block),
-        33 => hazy_bumped_value(simd, block),
-        34 => hazy_bumped_moved(simd, block),
-        35 => hazy_bumped_lobe_value(simd, block),
-        36 => hazy_bumped_lobe_moved(simd, block),
-        37 => hazy_bumped_strength_value(simd, block),
-        38 => hazy_bumped_strength_moved(simd, block),
-        39 => hazy_bumped_strength_lobe_moved(simd, block),
-        40 => hazy_bumped_anew_value(simd, block),
-        41 => hazy_bumped_anew_moved(simd, block),
-        42 => surface_anew_value(simd, block),
-        43 => surface_anew_moved(simd, block),
-        44 => listing_keep(simd, block),
-        45 => listing_lobe_keep(simd, block),
-        46 => listing_strength_keep(simd, block),
-        47 => listing_strength_value(simd, block),
-        48 => listing_strength_moved(simd, block),
-        49 => listing_strength_lobe_moved(simd, block),
-        50 => lit_keep(simd, block),
-        51 => lit_value(simd, block),
-        52 => lit_moved(simd, block),
-        53 => lit_strength_keep(simd, block),
-        54 => lit_strength_value(simd, block),
-        55 => lit_strength_moved(simd, block),
+        0 => surface_keep::<S, Lanes<S>>(simd, block),
+        1 => surface_value::<S, Lanes<S>>(simd, block),
+        2 => surface_moved::<S, Lanes<S>>(simd, block),
+        3 => surface_lobe_keep::<S, Lanes<S>>(simd, block),
+        4 => surface_lobe_value::<S, Lanes<S>>(simd, block),
+        5 => surface_lobe_moved::<S, Lanes<S>>(simd, block),
+        6 => surface_strength_keep::<S, Lanes<S>>(simd, block),
+        7 => surface_strength_value::<S, Lanes<S>>(simd, block),
+        8 => surface_strength_moved::<S, Lanes<S>>(simd, block),
+        9 => surface_strength_lobe_moved::<S, Lanes<S>>(simd, block),
+        10 => surface_all_value::<S, Lanes<S>>(simd, block),
+        11 => surface_all_moved::<S, Lanes<S>>(simd, block),
+        12 => bumped_keep::<S, Lanes<S>>(simd, block),
+        13 => bumped_value::<S, Lanes<S>>(simd, block),
+        14 => bumped_moved::<S, Lanes<S>>(simd, block),
+        15 => bumped_lobe_keep::<S, Lanes<S>>(simd, block),
+        16 => bumped_lobe_value::<S, Lanes<S>>(simd, block),
+        17 => bumped_lobe_moved::<S, Lanes<S>>(simd, block),
+        18 => bumped_strength_keep::<S, Lanes<S>>(simd, block),
+        19 => bumped_strength_value::<S, Lanes<S>>(simd, block),
+        20 => bumped_strength_moved::<S, Lanes<S>>(simd, block),
+        21 => bumped_strength_lobe_moved::<S, Lanes<S>>(simd, block),
+        22 => smooth_keep::<S, Lanes<S>>(simd, block),
+        23 => smooth_lobe_keep::<S, Lanes<S>>(simd, block),
+        24 => hazy_keep::<S, Lanes<S>>(simd, block),
+        25 => hazy_value::<S, Lanes<S>>(simd, block),
+        26 => hazy_moved::<S, Lanes<S>>(simd, block),
+        27 => hazy_lobe_value::<S, Lanes<S>>(simd, block),
+        28 => hazy_lobe_moved::<S, Lanes<S>>(simd, block),
+        29 => hazy_strength_value::<S, Lanes<S>>(simd, block),
+        30 => hazy_strength_moved::<S, Lanes<S>>(simd, block),
+        31 => hazy_strength_lobe_moved::<S, Lanes<S>>(simd, block),
+        32 => hazy_bumped_keep::<S, Lanes<S>>(simd, block),
+        33 => hazy_bumped_value::<S, Lanes<S>>(simd, block),
+        34 => hazy_bumped_moved::<S, Lanes<S>>(simd, block),
+        35 => hazy_bumped_lobe_value::<S, Lanes<S>>(simd, block),
+        36 => hazy_bumped_lobe_moved::<S, Lanes<S>>(simd, block),
+        37 => hazy_bumped_strength_value::<S, Lanes<S>>(simd, block),
+        38 => hazy_bumped_strength_moved::<S, Lanes<S>>(simd, block),
+        39 => hazy_bumped_strength_lobe_moved::<S, Lanes<S>>(simd, block),
+        40 => hazy_bumped_anew_value::<S, Lanes<S>>(simd, block),
+        41 => hazy_bumped_anew_moved::<S, Lanes<S>>(simd, block),
+        42 => surface_anew_value::<S, Lanes<S>>(simd, block),
+        43 => surface_anew_moved::<S, Lanes<S>>(simd, block),
+        44 => listing_keep::<S, Lanes<S>>(simd, block),
+        45 => listing_lobe_keep::<S, Lanes<S>>(simd, block),
+        46 => listing_strength_keep::<S, Lanes<S>>(simd, block),
+        47 => listing_strength_value::<S, Lanes<S>>(simd, block),
+        48 => listing_strength_moved::<S, Lanes<S>>(simd, block),
+        49 => listing_strength_lobe_moved::<S, Lanes<S>>(simd, block),
+        50 => lit_keep::<S, Lanes<S>>(simd, block),
+        51 => lit_value::<S, R>(simd, block),
+        52 => lit_moved::<S, R>(simd, block),
+        53 => lit_strength_keep::<S, Lanes<S>>(simd, block),
+        54 => lit_strength_value::<S, R>(simd, block),
+        55 => lit_strength_moved::<S, R>(simd, block),
         _ => {}
     }
 }
 
 #[inline(never)]
-fn surface_keep<S: Simd>(simd: S, block: Block<'_>) {
+fn surface_keep<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 2] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<17>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<14>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
             let r0 = samples(6);
             let r1 = samples(7);
             let r2 = samples(8);
@@ -246,28 +249,30 @@ fn surface_keep<S: Simd>(simd: S, block: Block<'_>) {
             put(12, i, r8);
             let r6 = r0 * r6;
             put(13, i, r6);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn surface_value<S: Simd>(simd: S, block: Block<'_>) {
+fn surface_value<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 20] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<14>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<3>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<14>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = kept(1);
             let r1 = select(r0.ge(lit(1.2e-38)), r0, lit(1.0));
             let r1 = r1.log2();
@@ -313,28 +318,30 @@ fn surface_value<S: Simd>(simd: S, block: Block<'_>) {
             let r5 = r0.mul_add(u(19), r5);
             let r5 = r2.mul_add(r6, r5);
             put(2, i, r5);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn surface_moved<S: Simd>(simd: S, block: Block<'_>) {
+fn surface_moved<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 22] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<14>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<24>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<14>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = kept(1);
             let r1 = select(r0.ge(lit(1.2e-38)), r0, lit(1.0));
             let r1 = r1.log2();
@@ -428,26 +435,28 @@ fn surface_moved<S: Simd>(simd: S, block: Block<'_>) {
             put(22, i, r15);
             let r3 = r21 * r3;
             put(23, i, r3);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn surface_lobe_keep<S: Simd>(simd: S, block: Block<'_>) {
+fn surface_lobe_keep<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 2] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<17>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<12>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
             let r0 = samples(6);
             let r1 = samples(7);
             let r2 = samples(8);
@@ -524,28 +533,30 @@ fn surface_lobe_keep<S: Simd>(simd: S, block: Block<'_>) {
             let r2 = samples(14);
             let r12 = r2 * r12;
             put(11, i, r12);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn surface_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
+fn surface_lobe_value<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 20] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<16>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<3>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<12>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = kept(3);
             let r1 = kept(4);
             let r2 = kept(5);
@@ -607,28 +618,30 @@ fn surface_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
             let r13 = r12.mul_add(u(19), r13);
             let r13 = r8.mul_add(r9, r13);
             put(2, i, r13);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn surface_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
+fn surface_lobe_moved<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 22] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<16>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<27>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<12>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = kept(3);
             let r1 = kept(4);
             let r2 = kept(5);
@@ -761,26 +774,28 @@ fn surface_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r3 = u(18) * r3;
             let r3 = u(19).mul_add(r7, r3);
             put(26, i, r3);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn surface_strength_keep<S: Simd>(simd: S, block: Block<'_>) {
+fn surface_strength_keep<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 0] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<17>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<3>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
             let r0 = samples(6);
             let r1 = samples(7);
             let r2 = samples(8);
@@ -797,28 +812,30 @@ fn surface_strength_keep<S: Simd>(simd: S, block: Block<'_>) {
             put(1, i, r0);
             let r6 = r2 * r6;
             put(2, i, r6);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn surface_strength_value<S: Simd>(simd: S, block: Block<'_>) {
+fn surface_strength_value<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 22] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<19>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<3>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<3>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = samples(5);
             let r1 = samples(4);
             let r0 = r0.mul_add(u(0), r1);
@@ -925,28 +942,30 @@ fn surface_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r15 = r14.mul_add(u(21), r15);
             let r15 = r6.mul_add(r5, r15);
             put(2, i, r15);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn surface_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
+fn surface_strength_moved<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 24] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<19>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<27>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<3>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = samples(5);
             let r1 = samples(4);
             let r2 = r0.mul_add(u(0), r1);
@@ -1149,28 +1168,30 @@ fn surface_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r32 = r36.mul_add(r21, r32);
             let r32 = u(20).mul_add(r34, r32);
             put(26, i, r32);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn surface_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
+fn surface_strength_lobe_moved<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 24] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<19>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<30>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<3>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = samples(5);
             let r1 = samples(4);
             let r2 = r0.mul_add(u(0), r1);
@@ -1396,26 +1417,28 @@ fn surface_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r17 = u(20) * r17;
             let r17 = u(21).mul_add(r42, r17);
             put(29, i, r17);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn surface_all_value<S: Simd>(simd: S, block: Block<'_>) {
+fn surface_all_value<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 24] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<17>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<3>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
             let r0 = samples(4);
             let r1 = samples(3);
             let r2 = r1 * u(0);
@@ -1541,26 +1564,28 @@ fn surface_all_value<S: Simd>(simd: S, block: Block<'_>) {
             let r5 = r6.mul_add(u(23), r5);
             let r5 = r12.mul_add(r18, r5);
             put(2, i, r5);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn surface_all_moved<S: Simd>(simd: S, block: Block<'_>) {
+fn surface_all_moved<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 28] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<17>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<33>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
             let r0 = samples(3);
             let r1 = samples(4);
             let r2 = r0 * u(0);
@@ -1875,26 +1900,28 @@ fn surface_all_moved<S: Simd>(simd: S, block: Block<'_>) {
             put(14, i, r35);
             let r19 = r18 * r19;
             put(11, i, r19);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn bumped_keep<S: Simd>(simd: S, block: Block<'_>) {
+fn bumped_keep<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 3] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<16>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<14>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
             let r0 = samples(6);
             let r1 = samples(7);
             let r2 = samples(8);
@@ -1993,28 +2020,30 @@ fn bumped_keep<S: Simd>(simd: S, block: Block<'_>) {
             put(12, i, r8);
             let r6 = r1 * r6;
             put(13, i, r6);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn bumped_value<S: Simd>(simd: S, block: Block<'_>) {
+fn bumped_value<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 20] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<14>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<3>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<14>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = kept(1);
             let r1 = select(r0.ge(lit(1.2e-38)), r0, lit(1.0));
             let r1 = r1.log2();
@@ -2060,28 +2089,30 @@ fn bumped_value<S: Simd>(simd: S, block: Block<'_>) {
             let r5 = r0.mul_add(u(19), r5);
             let r5 = r2.mul_add(r6, r5);
             put(2, i, r5);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn bumped_moved<S: Simd>(simd: S, block: Block<'_>) {
+fn bumped_moved<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 22] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<14>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<24>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<14>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = kept(1);
             let r1 = select(r0.ge(lit(1.2e-38)), r0, lit(1.0));
             let r1 = r1.log2();
@@ -2175,26 +2206,28 @@ fn bumped_moved<S: Simd>(simd: S, block: Block<'_>) {
             put(22, i, r15);
             let r3 = r21 * r3;
             put(23, i, r3);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn bumped_lobe_keep<S: Simd>(simd: S, block: Block<'_>) {
+fn bumped_lobe_keep<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 3] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<16>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<13>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
             let r0 = samples(6);
             let r1 = samples(7);
             let r2 = samples(8);
@@ -2275,28 +2308,30 @@ fn bumped_lobe_keep<S: Simd>(simd: S, block: Block<'_>) {
             let r2 = samples(13);
             let r12 = r2 * r12;
             put(12, i, r12);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn bumped_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
+fn bumped_lobe_value<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 20] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<16>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<3>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<13>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = kept(4);
             let r1 = kept(5);
             let r2 = kept(6);
@@ -2358,28 +2393,30 @@ fn bumped_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
             let r13 = r12.mul_add(u(19), r13);
             let r13 = r8.mul_add(r9, r13);
             put(2, i, r13);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn bumped_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
+fn bumped_lobe_moved<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 22] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<16>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<27>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<13>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = kept(4);
             let r1 = kept(5);
             let r2 = kept(6);
@@ -2512,26 +2549,28 @@ fn bumped_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r3 = u(18) * r3;
             let r3 = u(19).mul_add(r7, r3);
             put(26, i, r3);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn bumped_strength_keep<S: Simd>(simd: S, block: Block<'_>) {
+fn bumped_strength_keep<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 0] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<16>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<3>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
             let r0 = samples(6);
             let r1 = samples(7);
             let r2 = samples(8);
@@ -2548,28 +2587,30 @@ fn bumped_strength_keep<S: Simd>(simd: S, block: Block<'_>) {
             put(1, i, r0);
             let r6 = r2 * r6;
             put(2, i, r6);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn bumped_strength_value<S: Simd>(simd: S, block: Block<'_>) {
+fn bumped_strength_value<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 22] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<18>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<3>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<3>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = samples(4);
             let r1 = samples(3);
             let r0 = r0.mul_add(u(0), r1);
@@ -2678,28 +2719,30 @@ fn bumped_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r15 = r14.mul_add(u(21), r15);
             let r15 = r7.mul_add(r5, r15);
             put(2, i, r15);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn bumped_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
+fn bumped_strength_moved<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 32] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<18>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<27>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<3>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = samples(4);
             let r1 = samples(3);
             let r2 = r0.mul_add(u(0), r1);
@@ -2928,28 +2971,30 @@ fn bumped_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r37 = u(21).mul_add(r35, r37);
             let r37 = r7.mul_add(r24, r37);
             put(26, i, r37);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn bumped_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
+fn bumped_strength_lobe_moved<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 32] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<18>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<30>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<3>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = samples(4);
             let r1 = samples(3);
             let r2 = r0.mul_add(u(0), r1);
@@ -3201,26 +3246,28 @@ fn bumped_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r17 = u(20) * r17;
             let r17 = u(21).mul_add(r35, r17);
             put(29, i, r17);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn smooth_keep<S: Simd>(simd: S, block: Block<'_>) {
+fn smooth_keep<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 1] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<14>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<14>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
             let r0 = samples(3);
             let r1 = samples(4);
             let r2 = samples(5);
@@ -3311,26 +3358,28 @@ fn smooth_keep<S: Simd>(simd: S, block: Block<'_>) {
             put(12, i, r14);
             let r15 = r0 * r15;
             put(13, i, r15);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn smooth_lobe_keep<S: Simd>(simd: S, block: Block<'_>) {
+fn smooth_lobe_keep<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 1] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<14>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<12>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
             let r0 = samples(3);
             let r1 = samples(4);
             let r2 = samples(5);
@@ -3401,26 +3450,28 @@ fn smooth_lobe_keep<S: Simd>(simd: S, block: Block<'_>) {
             let r2 = samples(11);
             let r9 = r2 * r9;
             put(11, i, r9);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn hazy_keep<S: Simd>(simd: S, block: Block<'_>) {
+fn hazy_keep<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 2] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<17>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<15>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
             let r0 = samples(6);
             let r1 = samples(7);
             let r2 = samples(8);
@@ -3520,28 +3571,30 @@ fn hazy_keep<S: Simd>(simd: S, block: Block<'_>) {
             put(13, i, r8);
             let r6 = r5 * r6;
             put(14, i, r6);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn hazy_value<S: Simd>(simd: S, block: Block<'_>) {
+fn hazy_value<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 21] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<15>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<4>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<15>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = kept(1);
             let r1 = select(r0.ge(lit(1.2e-38)), r0, lit(1.0));
             let r1 = r1.log2();
@@ -3590,28 +3643,30 @@ fn hazy_value<S: Simd>(simd: S, block: Block<'_>) {
             let r6 = kept(11);
             let r6 = r6 * u(20);
             put(3, i, r6);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn hazy_moved<S: Simd>(simd: S, block: Block<'_>) {
+fn hazy_moved<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 23] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<15>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<26>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<15>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = kept(1);
             let r1 = select(r0.ge(lit(1.2e-38)), r0, lit(1.0));
             let r1 = r1.log2();
@@ -3709,28 +3764,30 @@ fn hazy_moved<S: Simd>(simd: S, block: Block<'_>) {
             put(23, i, r15);
             let r3 = r21 * r3;
             put(24, i, r3);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn hazy_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
+fn hazy_lobe_value<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 21] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<17>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<4>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<12>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = kept(3);
             let r1 = kept(4);
             let r2 = kept(5);
@@ -3797,28 +3854,30 @@ fn hazy_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
             let r13 = r9 * r13;
             let r13 = r13 * u(20);
             put(3, i, r13);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn hazy_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
+fn hazy_lobe_moved<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 23] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<17>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<30>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<12>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = kept(3);
             let r1 = kept(4);
             let r2 = kept(5);
@@ -3961,28 +4020,30 @@ fn hazy_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r29 = r33 * r29;
             let r29 = u(20) * r29;
             put(28, i, r29);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn hazy_strength_value<S: Simd>(simd: S, block: Block<'_>) {
+fn hazy_strength_value<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 23] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<20>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<4>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<3>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = samples(5);
             let r1 = samples(4);
             let r0 = r0.mul_add(u(0), r1);
@@ -4094,28 +4155,30 @@ fn hazy_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r15 = r5 * r15;
             let r15 = r15 * u(22);
             put(3, i, r15);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn hazy_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
+fn hazy_strength_moved<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 25] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<20>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<30>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<3>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = samples(5);
             let r1 = samples(4);
             let r2 = r0.mul_add(u(0), r1);
@@ -4328,28 +4391,30 @@ fn hazy_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r34 = r43 * r34;
             let r34 = u(22) * r34;
             put(28, i, r34);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn hazy_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
+fn hazy_strength_lobe_moved<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 25] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<20>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<34>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<3>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = samples(5);
             let r1 = samples(4);
             let r2 = r0.mul_add(u(0), r1);
@@ -4589,26 +4654,28 @@ fn hazy_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r45 = r49 * r45;
             let r45 = u(22) * r45;
             put(32, i, r45);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn hazy_bumped_keep<S: Simd>(simd: S, block: Block<'_>) {
+fn hazy_bumped_keep<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 3] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<16>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<15>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
             let r0 = samples(6);
             let r1 = samples(7);
             let r2 = samples(8);
@@ -4710,28 +4777,30 @@ fn hazy_bumped_keep<S: Simd>(simd: S, block: Block<'_>) {
             put(13, i, r8);
             let r6 = r5 * r6;
             put(14, i, r6);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn hazy_bumped_value<S: Simd>(simd: S, block: Block<'_>) {
+fn hazy_bumped_value<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 21] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<15>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<4>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<15>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = kept(1);
             let r1 = select(r0.ge(lit(1.2e-38)), r0, lit(1.0));
             let r1 = r1.log2();
@@ -4780,28 +4849,30 @@ fn hazy_bumped_value<S: Simd>(simd: S, block: Block<'_>) {
             let r6 = kept(11);
             let r6 = r6 * u(20);
             put(3, i, r6);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn hazy_bumped_moved<S: Simd>(simd: S, block: Block<'_>) {
+fn hazy_bumped_moved<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 23] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<15>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<26>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<15>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = kept(1);
             let r1 = select(r0.ge(lit(1.2e-38)), r0, lit(1.0));
             let r1 = r1.log2();
@@ -4899,28 +4970,30 @@ fn hazy_bumped_moved<S: Simd>(simd: S, block: Block<'_>) {
             put(23, i, r15);
             let r3 = r21 * r3;
             put(24, i, r3);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn hazy_bumped_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
+fn hazy_bumped_lobe_value<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 21] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<17>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<4>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<13>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = kept(4);
             let r1 = kept(5);
             let r2 = kept(6);
@@ -4987,28 +5060,30 @@ fn hazy_bumped_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
             let r13 = r9 * r13;
             let r13 = r13 * u(20);
             put(3, i, r13);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn hazy_bumped_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
+fn hazy_bumped_lobe_moved<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 23] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<17>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<30>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<13>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = kept(4);
             let r1 = kept(5);
             let r2 = kept(6);
@@ -5151,28 +5226,30 @@ fn hazy_bumped_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r29 = r33 * r29;
             let r29 = u(20) * r29;
             put(28, i, r29);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn hazy_bumped_strength_value<S: Simd>(simd: S, block: Block<'_>) {
+fn hazy_bumped_strength_value<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 23] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<19>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<4>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<3>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = samples(4);
             let r1 = samples(3);
             let r0 = r0.mul_add(u(0), r1);
@@ -5286,28 +5363,30 @@ fn hazy_bumped_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r15 = r5 * r15;
             let r15 = r15 * u(22);
             put(3, i, r15);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn hazy_bumped_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
+fn hazy_bumped_strength_moved<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 33] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<19>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<30>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<3>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = samples(4);
             let r1 = samples(3);
             let r2 = r0.mul_add(u(0), r1);
@@ -5546,28 +5625,30 @@ fn hazy_bumped_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r37 = r46 * r37;
             let r37 = u(22) * r37;
             put(28, i, r37);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn hazy_bumped_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
+fn hazy_bumped_strength_lobe_moved<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 33] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<19>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<34>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<3>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = samples(4);
             let r1 = samples(3);
             let r2 = r0.mul_add(u(0), r1);
@@ -5833,26 +5914,28 @@ fn hazy_bumped_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r13 = r52 * r13;
             let r13 = u(22) * r13;
             put(32, i, r13);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn hazy_bumped_anew_value<S: Simd>(simd: S, block: Block<'_>) {
+fn hazy_bumped_anew_value<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 23] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<16>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<4>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
             let r0 = samples(2);
             let r1 = samples(3);
             let r2 = samples(4);
@@ -5972,26 +6055,28 @@ fn hazy_bumped_anew_value<S: Simd>(simd: S, block: Block<'_>) {
             let r3 = r0 * r3;
             let r3 = r3 * u(22);
             put(3, i, r3);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn hazy_bumped_anew_moved<S: Simd>(simd: S, block: Block<'_>) {
+fn hazy_bumped_anew_moved<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 33] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<16>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<30>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
             let r0 = samples(2);
             let r1 = samples(3);
             let r2 = samples(4);
@@ -6235,26 +6320,28 @@ fn hazy_bumped_anew_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r41 = r31 * r41;
             let r41 = u(22) * r41;
             put(28, i, r41);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn surface_anew_value<S: Simd>(simd: S, block: Block<'_>) {
+fn surface_anew_value<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 22] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<17>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<3>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
             let r0 = samples(1);
             let r1 = samples(2);
             let r2 = samples(3);
@@ -6366,26 +6453,28 @@ fn surface_anew_value<S: Simd>(simd: S, block: Block<'_>) {
             let r18 = r3.mul_add(u(21), r18);
             let r18 = r0.mul_add(r17, r18);
             put(2, i, r18);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn surface_anew_moved<S: Simd>(simd: S, block: Block<'_>) {
+fn surface_anew_moved<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 24] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<17>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<30>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
             let r0 = samples(1);
             let r1 = samples(2);
             let r2 = samples(3);
@@ -6616,26 +6705,28 @@ fn surface_anew_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r20 = u(20) * r20;
             let r20 = u(21).mul_add(r24, r20);
             put(29, i, r20);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn listing_keep<S: Simd>(simd: S, block: Block<'_>) {
+fn listing_keep<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 5] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<17>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<14>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
             let r0 = samples(8);
             let r1 = r0.abs();
             let r2 = samples(6);
@@ -6755,26 +6846,28 @@ fn listing_keep<S: Simd>(simd: S, block: Block<'_>) {
             put(12, i, r13);
             let r12 = r2 * r12;
             put(13, i, r12);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn listing_lobe_keep<S: Simd>(simd: S, block: Block<'_>) {
+fn listing_lobe_keep<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 5] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<17>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<12>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
             let r0 = samples(8);
             let r1 = r0.abs();
             let r2 = samples(6);
@@ -6874,26 +6967,28 @@ fn listing_lobe_keep<S: Simd>(simd: S, block: Block<'_>) {
             let r0 = samples(14);
             let r4 = r0 * r4;
             put(11, i, r4);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn listing_strength_keep<S: Simd>(simd: S, block: Block<'_>) {
+fn listing_strength_keep<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 3] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<17>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<3>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
             let r0 = samples(8);
             let r1 = r0.abs();
             let r2 = samples(6);
@@ -6924,28 +7019,30 @@ fn listing_strength_keep<S: Simd>(simd: S, block: Block<'_>) {
             put(1, i, r2);
             let r6 = r0 * r6;
             put(2, i, r6);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn listing_strength_value<S: Simd>(simd: S, block: Block<'_>) {
+fn listing_strength_value<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 24] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<19>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<3>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<3>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = samples(5);
             let r1 = samples(4);
             let r1 = r0.mul_add(u(0), r1);
@@ -7061,28 +7158,30 @@ fn listing_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r15 = r14.mul_add(u(23), r15);
             let r15 = r4.mul_add(r12, r15);
             put(2, i, r15);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn listing_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
+fn listing_strength_moved<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 25] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<19>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<27>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<3>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = samples(5);
             let r1 = samples(4);
             let r1 = r0.mul_add(u(0), r1);
@@ -7290,28 +7389,30 @@ fn listing_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r32 = r36.mul_add(r21, r32);
             let r32 = u(22).mul_add(r34, r32);
             put(26, i, r32);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn listing_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
+fn listing_strength_lobe_moved<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 25] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<19>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<30>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<3>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = samples(5);
             let r1 = samples(4);
             let r1 = r0.mul_add(u(0), r1);
@@ -7542,26 +7643,28 @@ fn listing_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r1 = u(22) * r1;
             let r1 = u(23).mul_add(r42, r1);
             put(29, i, r1);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn lit_keep<S: Simd>(simd: S, block: Block<'_>) {
+fn lit_keep<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 24] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<28>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<12>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
             let r0 = samples(3);
             let r1 = samples(0);
             let r0 = r0.mul_add(u(0), r1);
@@ -7694,28 +7797,32 @@ fn lit_keep<S: Simd>(simd: S, block: Block<'_>) {
             let r15 = (-u(15)).mul_add(r15, lit(1.0));
             let r18 = r15 * r18;
             put(11, i, r18);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn lit_value<S: Simd>(simd: S, block: Block<'_>) {
+fn lit_value<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
-        let numbers: &[f32; 187] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let lit = |x: f64| R::splat(simd, x as f32);
+        let numbers: &[f32; 188] = block.uniforms();
+        let u = |k: usize| R::splat(simd, numbers[k]);
+        let of_members = numbers.as_chunks::<3>().0;
+        let own = |m: usize, k: usize| R::splat(simd, of_members[m][k]);
         let fields = block.fields::<23>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<3>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<12>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = kept(2);
             let r1 = samples(0);
             let r2 = samples(4);
@@ -7750,17 +7857,17 @@ fn lit_value<S: Simd>(simd: S, block: Block<'_>) {
             let r7 = samples(7);
             let r11 = select(r7.ge(lit(1.2e-38)), r7, lit(1.0));
             let r11 = r11.log2();
-            let r11 = u(5) * r11;
+            let r11 = u(17) * r11;
             let r11 = r11.exp2();
             let r9 = samples(6);
-            let r13 = (-r9).mul_add(u(6), lit(1.0));
-            let r13 = u(7) * r13;
+            let r13 = (-r9).mul_add(u(18), lit(1.0));
+            let r13 = u(19) * r13;
             let r13 = r13.max(lit(0.05));
             let r14 = r13 * r13;
             let r15 = r14 * lit(-3.321928);
             let r15 = r14 * r15;
             let r15 = r15.exp2();
-            let r16 = r9.mul_add(u(10), u(11));
+            let r16 = r9.mul_add(u(22), u(23));
             let r6 = -r6;
             let r17 = lit(0.0).max(r6);
             let r17 = lit(1e-6).max(r17);
@@ -7899,441 +8006,245 @@ fn lit_value<S: Simd>(simd: S, block: Block<'_>) {
             let r18 = r16 * r18;
             let r21 = r19 * r21;
             let r21 = r17 * r21;
-            let r21 = u(125).mul_add(r18, r21);
-            let r18 = r21 * u(126);
+            let r21 = u(137).mul_add(r18, r21);
+            let r18 = r21 * u(138);
             let r18 = lit(1.0).min(r18);
-            let r18 = (-r18).mul_add(u(127), lit(1.0));
-            let r11 = select(r7.ge(lit(1.2e-38)), r11, u(128));
-            let r7 = r11.mul_add(u(129), u(130));
+            let r18 = (-r18).mul_add(u(139), lit(1.0));
+            let r11 = select(r7.ge(lit(1.2e-38)), r11, u(140));
+            let r7 = r11.mul_add(u(141), u(142));
             let r7 = r18 * r7;
             let r18 = samples(8);
-            let r17 = kept(3);
-            let r19 = kept(4);
-            let r20 = kept(5);
-            let r13 = kept(6);
-            let r22 = r13 * u(131);
-            let r22 = r20.mul_add(u(132), r22);
-            let r22 = r19.mul_add(u(133), r22);
-            let r22 = r17.mul_add(u(134), r22);
-            let r23 = kept(9);
-            let r23 = r22 + r23;
-            let r23 = r18 * r23;
-            let r18 = samples(16);
-            let r22 = kept(8);
-            let r24 = kept(7);
-            let r25 = r24.abs();
-            let r25 = r25.min(lit(0.999999));
-            let r26 = (-r25).mul_add(lit(0.0187293), lit(0.074261));
-            let r26 = r25.mul_add(r26, lit(-0.2121144));
-            let r26 = r25.mul_add(r26, lit(1.5707288));
-            let r25 = lit(1.0) - r25;
-            let r25 = r25.sqrt();
-            let r25 = r26 * r25;
-            let r26 = lit(3.141592653589793) - r25;
-            let r26 = select(r24.ge(lit(0.0)), r25, r26);
-            let r25 = r15.abs();
-            let r25 = lit(0.999999).min(r25);
-            let r27 = (-lit(0.0187293)).mul_add(r25, lit(0.074261));
-            let r27 = r25.mul_add(r27, lit(-0.2121144));
-            let r27 = r25.mul_add(r27, lit(1.5707288));
-            let r25 = lit(1.0) - r25;
-            let r25 = r25.sqrt();
-            let r25 = r27 * r25;
-            let r27 = lit(3.141592653589793) - r25;
-            let r27 = select(r15.ge(lit(0.0)), r25, r27);
-            let r25 = r26 - r27;
-            let r25 = r25.abs();
-            let r22 = r22 - r25;
-            let r27 = r26 + r27;
-            let r25 = r27 - r25;
-            let r25 = r25.max(lit(0.0001));
-            let r25 = r22 / r25;
-            let r25 = lit(1.0) - r25;
-            let r25 = lit(0.0).max(r25);
-            let r25 = lit(1.0).min(r25);
-            let r22 = r25 * r25;
-            let r25 = (-lit(2.0)).mul_add(r25, lit(3.0));
-            let r25 = r22 * r25;
-            let r24 = r24.max(r15);
-            let r24 = lit(1.0) - r24;
-            let r24 = r25 * r24;
-            let r15 = lit(1.0) - r15;
-            let r15 = r24 / r15;
-            let r24 = lit(1.0) - r15;
-            let texels243 = cubes[1].footprint_at(r8, r12, r10);
-            let texels244 = texels243;
-            let cube = cubes[1];
-            let at = texels243;
-            let [r25, r22, r27, _] = cube.sample_at(&at);
-            let cube = cubes[0];
-            let at = texels244;
-            let [r26, r28, r29, _] = cube.sample_at(&at);
-            let r25 = r25 - r26;
-            let r26 = r9.mul_add(r25, r26);
-            let r26 = r15 * r26;
-            let r26 = r18.mul_add(r24, r26);
-            let r26 = r21 * r26;
-            let r18 = r5 * u(143);
-            let r18 = r3.mul_add(u(144), r18);
-            let r18 = r0.mul_add(u(145), r18);
-            let r25 = binary(Binary::Less, lit(0.0), r6);
-            let r10 = select(lit(0.0).lt(r18), r25, lit(0.0));
-            let r12 = u(145) - r1;
-            let r8 = u(144) - r2;
-            let r30 = u(143) - r4;
-            let r31 = r30 * r30;
-            let r31 = r8.mul_add(r8, r31);
-            let r31 = r12.mul_add(r12, r31);
-            let r32 = binary(Binary::Less, lit(1e-12), r31);
-            let r32 = select(r10.ge(lit(0.5)), r32, lit(0.0));
-            let r16 = u(125) * r16;
-            let r10 = select(r16.lt(lit(1.0)), r16, lit(0.0));
-            let r33 = r10 * lit(8.0);
-            let r10 = r10.max(lit(1e-24));
-            let r10 = r10.sqrt();
-            let r34 = lit(1.0) - r10;
-            let r31 = select(r32.ge(lit(0.5)), r31, lit(1.0));
-            let r35 = r31.sqrt();
-            let r35 = lit(0.5) * r35;
-            let r35 = select(r32.ge(lit(0.5)), r35, lit(1.0));
-            let r10 = r10 * lit(4.0);
-            let r36 = r34 * r34;
-            let r36 = r10 / r36;
-            let r10 = r35.mul_add(r35, r36);
-            let r10 = r10.sqrt();
-            let r10 = r35 + r10;
-            let r10 = lit(0.1).max(r10);
-            let r37 = r34 * r10;
-            let r37 = r37 * r37;
-            let r37 = r37 * r37;
-            let r37 = r33 / r37;
-            let r38 = r35 * r10;
-            let r38 = r38 - lit(1.0);
-            let r10 = r36 / r10;
-            let r10 = r35.mul_add(r10, lit(1.0));
-            let r10 = r38 / r10;
-            let r10 = r10.mul_add(r10, lit(1.0));
-            let r10 = r37 * r10;
-            let r10 = select(r16.lt(lit(1.0)), r10, lit(1.0));
+            let r17 = kept(9);
+            let r19 = binary(Binary::Less, lit(0.0), r6);
+            let r16 = u(137) * r16;
+            let r20 = select(r16.lt(lit(1.0)), r16, lit(0.0));
+            let r13 = r20 * lit(8.0);
+            let r20 = r20.max(lit(1e-24));
+            let r20 = r20.sqrt();
+            let r22 = lit(1.0) - r20;
+            let r20 = r20 * lit(4.0);
+            let r23 = r22 * r22;
+            let r23 = r20 / r23;
             let r14 = r14 * r14;
-            let r37 = r5 * r30;
-            let r37 = r3.mul_add(r8, r37);
-            let r37 = r0.mul_add(r12, r37);
-            let r37 = r37 * r37;
-            let r38 = r5 * r8;
-            let r38 = (-r3).mul_add(r30, r38);
-            let r30 = r0 * r30;
-            let r30 = (-r5).mul_add(r12, r30);
-            let r12 = r3 * r12;
-            let r12 = (-r0).mul_add(r8, r12);
-            let r12 = r12 * r12;
-            let r12 = r30.mul_add(r30, r12);
-            let r12 = r38.mul_add(r38, r12);
-            let r12 = r14.mul_add(r37, r12);
-            let r31 = r12 / r31;
-            let r31 = select(r32.ge(lit(0.5)), r31, lit(1.0));
-            let r12 = lit(3.141592653589793) * r31;
-            let r12 = r31 * r12;
-            let r12 = r14 / r12;
-            let r18 = select(r32.ge(lit(0.5)), r18, lit(1.0));
-            let r31 = lit(1.0) - r14;
-            let r37 = select(r32.ge(lit(0.5)), r6, lit(1.0));
-            let r38 = r37 * r37;
-            let r38 = r31.mul_add(r38, r14);
-            let r38 = r38.sqrt();
-            let r30 = r18 * r18;
-            let r30 = r31.mul_add(r30, r14);
-            let r30 = r30.sqrt();
-            let r30 = r37 * r30;
-            let r30 = r18.mul_add(r38, r30);
-            let r30 = lit(1e-6).max(r30);
-            let r30 = lit(0.5) / r30;
-            let r30 = r12 * r30;
-            let r30 = r10 * r30;
-            let r30 = select(r32.ge(lit(0.5)), r30, lit(0.0));
-            let r30 = r17 * r30;
-            let r32 = r5 * u(152);
-            let r32 = r3.mul_add(u(153), r32);
-            let r32 = r0.mul_add(u(154), r32);
-            let r10 = select(lit(0.0).lt(r32), r25, lit(0.0));
-            let r12 = u(154) - r1;
-            let r38 = u(153) - r2;
-            let r18 = u(152) - r4;
-            let r37 = r18 * r18;
-            let r37 = r38.mul_add(r38, r37);
-            let r37 = r12.mul_add(r12, r37);
-            let r8 = binary(Binary::Less, lit(1e-12), r37);
-            let r8 = select(r10.ge(lit(0.5)), r8, lit(0.0));
-            let r37 = select(r8.ge(lit(0.5)), r37, lit(1.0));
-            let r10 = r37.sqrt();
-            let r10 = lit(0.5) * r10;
-            let r10 = select(r8.ge(lit(0.5)), r10, lit(1.0));
-            let r35 = r10.mul_add(r10, r36);
-            let r35 = r35.sqrt();
-            let r35 = r10 + r35;
-            let r35 = lit(0.1).max(r35);
-            let r39 = r34 * r35;
-            let r39 = r39 * r39;
-            let r39 = r39 * r39;
-            let r39 = r33 / r39;
-            let r40 = r10 * r35;
-            let r40 = r40 - lit(1.0);
-            let r35 = r36 / r35;
-            let r35 = r10.mul_add(r35, lit(1.0));
-            let r35 = r40 / r35;
-            let r35 = r35.mul_add(r35, lit(1.0));
-            let r35 = r39 * r35;
-            let r35 = select(r16.lt(lit(1.0)), r35, lit(1.0));
-            let r39 = r5 * r18;
-            let r39 = r3.mul_add(r38, r39);
-            let r39 = r0.mul_add(r12, r39);
-            let r39 = r39 * r39;
-            let r40 = r5 * r38;
-            let r40 = (-r3).mul_add(r18, r40);
-            let r18 = r0 * r18;
-            let r18 = (-r5).mul_add(r12, r18);
-            let r12 = r3 * r12;
-            let r12 = (-r0).mul_add(r38, r12);
-            let r12 = r12 * r12;
-            let r12 = r18.mul_add(r18, r12);
-            let r12 = r40.mul_add(r40, r12);
-            let r12 = r14.mul_add(r39, r12);
-            let r37 = r12 / r37;
-            let r37 = select(r8.ge(lit(0.5)), r37, lit(1.0));
-            let r12 = lit(3.141592653589793) * r37;
-            let r12 = r37 * r12;
-            let r12 = r14 / r12;
-            let r32 = select(r8.ge(lit(0.5)), r32, lit(1.0));
-            let r37 = select(r8.ge(lit(0.5)), r6, lit(1.0));
-            let r39 = r37 * r37;
-            let r39 = r31.mul_add(r39, r14);
-            let r39 = r39.sqrt();
-            let r40 = r32 * r32;
-            let r40 = r31.mul_add(r40, r14);
-            let r40 = r40.sqrt();
-            let r40 = r37 * r40;
-            let r40 = r32.mul_add(r39, r40);
-            let r40 = lit(1e-6).max(r40);
-            let r40 = lit(0.5) / r40;
-            let r40 = r12 * r40;
-            let r40 = r35 * r40;
-            let r40 = select(r8.ge(lit(0.5)), r40, lit(0.0));
-            let r40 = r19 * r40;
-            let r8 = r5 * u(155);
-            let r8 = r3.mul_add(u(156), r8);
-            let r8 = r0.mul_add(u(157), r8);
-            let r35 = select(lit(0.0).lt(r8), r25, lit(0.0));
-            let r12 = u(157) - r1;
-            let r39 = u(156) - r2;
-            let r32 = u(155) - r4;
-            let r37 = r32 * r32;
-            let r37 = r39.mul_add(r39, r37);
-            let r37 = r12.mul_add(r12, r37);
-            let r18 = binary(Binary::Less, lit(1e-12), r37);
-            let r18 = select(r35.ge(lit(0.5)), r18, lit(0.0));
-            let r37 = select(r18.ge(lit(0.5)), r37, lit(1.0));
-            let r35 = r37.sqrt();
-            let r35 = lit(0.5) * r35;
-            let r35 = select(r18.ge(lit(0.5)), r35, lit(1.0));
-            let r38 = r35.mul_add(r35, r36);
-            let r38 = r38.sqrt();
-            let r38 = r35 + r38;
-            let r38 = lit(0.1).max(r38);
-            let r10 = r34 * r38;
-            let r10 = r10 * r10;
-            let r10 = r10 * r10;
-            let r10 = r33 / r10;
-            let r41 = r35 * r38;
-            let r41 = r41 - lit(1.0);
-            let r38 = r36 / r38;
-            let r38 = r35.mul_add(r38, lit(1.0));
-            let r38 = r41 / r38;
-            let r38 = r38.mul_add(r38, lit(1.0));
-            let r38 = r10 * r38;
-            let r38 = select(r16.lt(lit(1.0)), r38, lit(1.0));
-            let r10 = r5 * r32;
-            let r10 = r3.mul_add(r39, r10);
-            let r10 = r0.mul_add(r12, r10);
-            let r10 = r10 * r10;
-            let r41 = r5 * r39;
-            let r41 = (-r3).mul_add(r32, r41);
-            let r32 = r0 * r32;
-            let r32 = (-r5).mul_add(r12, r32);
-            let r12 = r3 * r12;
-            let r12 = (-r0).mul_add(r39, r12);
-            let r12 = r12 * r12;
-            let r12 = r32.mul_add(r32, r12);
-            let r12 = r41.mul_add(r41, r12);
-            let r12 = r14.mul_add(r10, r12);
-            let r37 = r12 / r37;
-            let r37 = select(r18.ge(lit(0.5)), r37, lit(1.0));
-            let r12 = lit(3.141592653589793) * r37;
-            let r12 = r37 * r12;
-            let r12 = r14 / r12;
-            let r8 = select(r18.ge(lit(0.5)), r8, lit(1.0));
-            let r37 = select(r18.ge(lit(0.5)), r6, lit(1.0));
-            let r10 = r37 * r37;
-            let r10 = r31.mul_add(r10, r14);
-            let r10 = r10.sqrt();
-            let r41 = r8 * r8;
-            let r41 = r31.mul_add(r41, r14);
-            let r41 = r41.sqrt();
-            let r41 = r37 * r41;
-            let r41 = r8.mul_add(r10, r41);
-            let r41 = lit(1e-6).max(r41);
-            let r41 = lit(0.5) / r41;
-            let r41 = r12 * r41;
-            let r41 = r38 * r41;
-            let r41 = select(r18.ge(lit(0.5)), r41, lit(0.0));
-            let r41 = r20 * r41;
-            let r18 = r5 * u(158);
-            let r18 = r3.mul_add(u(159), r18);
-            let r18 = r0.mul_add(u(160), r18);
-            let r25 = select(lit(0.0).lt(r18), r25, lit(0.0));
-            let r1 = u(160) - r1;
-            let r2 = u(159) - r2;
-            let r4 = u(158) - r4;
-            let r38 = r4 * r4;
-            let r38 = r2.mul_add(r2, r38);
-            let r38 = r1.mul_add(r1, r38);
-            let r12 = binary(Binary::Less, lit(1e-12), r38);
-            let r12 = select(r25.ge(lit(0.5)), r12, lit(0.0));
-            let r38 = select(r12.ge(lit(0.5)), r38, lit(1.0));
-            let r25 = r38.sqrt();
-            let r25 = lit(0.5) * r25;
-            let r25 = select(r12.ge(lit(0.5)), r25, lit(1.0));
-            let r10 = r25.mul_add(r25, r36);
-            let r10 = r10.sqrt();
-            let r10 = r25 + r10;
-            let r10 = lit(0.1).max(r10);
-            let r34 = r34 * r10;
-            let r34 = r34 * r34;
-            let r34 = r34 * r34;
-            let r34 = r33 / r34;
-            let r33 = r25 * r10;
-            let r33 = r33 - lit(1.0);
-            let r10 = r36 / r10;
-            let r10 = r25.mul_add(r10, lit(1.0));
-            let r10 = r33 / r10;
-            let r10 = r10.mul_add(r10, lit(1.0));
-            let r10 = r34 * r10;
-            let r10 = select(r16.lt(lit(1.0)), r10, lit(1.0));
-            let r16 = r5 * r4;
-            let r16 = r3.mul_add(r2, r16);
-            let r16 = r0.mul_add(r1, r16);
-            let r16 = r16 * r16;
-            let r34 = r5 * r2;
-            let r34 = (-r3).mul_add(r4, r34);
-            let r4 = r0 * r4;
-            let r4 = (-r5).mul_add(r1, r4);
-            let r1 = r3 * r1;
-            let r1 = (-r0).mul_add(r2, r1);
-            let r1 = r1 * r1;
-            let r1 = r4.mul_add(r4, r1);
-            let r1 = r34.mul_add(r34, r1);
-            let r1 = r14.mul_add(r16, r1);
-            let r38 = r1 / r38;
-            let r38 = select(r12.ge(lit(0.5)), r38, lit(1.0));
-            let r1 = lit(3.141592653589793) * r38;
-            let r1 = r38 * r1;
-            let r1 = r14 / r1;
-            let r18 = select(r12.ge(lit(0.5)), r18, lit(1.0));
-            let r6 = select(r12.ge(lit(0.5)), r6, lit(1.0));
-            let r38 = r6 * r6;
-            let r38 = r31.mul_add(r38, r14);
-            let r38 = r38.sqrt();
-            let r16 = r18 * r18;
-            let r14 = r31.mul_add(r16, r14);
-            let r14 = r14.sqrt();
-            let r14 = r6 * r14;
-            let r14 = r18.mul_add(r38, r14);
-            let r14 = lit(1e-6).max(r14);
-            let r14 = lit(0.5) / r14;
-            let r14 = r1 * r14;
-            let r14 = r10 * r14;
-            let r14 = select(r12.ge(lit(0.5)), r14, lit(0.0));
-            let r14 = r13 * r14;
-            let r12 = u(161) * r14;
-            let r12 = u(162).mul_add(r41, r12);
-            let r12 = u(163).mul_add(r40, r12);
-            let r12 = u(164).mul_add(r30, r12);
-            let r12 = u(126).mul_add(r26, r12);
-            let r12 = r7.mul_add(r23, r12);
-            put(0, i, r12);
-            let r23 = r21 * u(165);
-            let r23 = lit(1.0).min(r23);
-            let r23 = (-u(127)).mul_add(r23, lit(1.0));
-            let r7 = r11.mul_add(u(166), u(167));
-            let r7 = r23 * r7;
-            let r23 = samples(17);
-            let r26 = r13 * u(168);
-            let r26 = r20.mul_add(u(169), r26);
-            let r26 = r19.mul_add(u(170), r26);
-            let r26 = r17.mul_add(u(171), r26);
-            let r10 = kept(10);
-            let r10 = r26 + r10;
-            let r10 = r23 * r10;
-            let r23 = samples(19);
-            let r22 = r22 - r28;
-            let r28 = r9.mul_add(r22, r28);
+            let r20 = lit(1.0) - r14;
+            let r24 = samples(16);
+            let r25 = kept(8);
+            let r26 = kept(7);
+            let r27 = r26.abs();
+            let r27 = r27.min(lit(0.999999));
+            let r28 = (-r27).mul_add(lit(0.0187293), lit(0.074261));
+            let r28 = r27.mul_add(r28, lit(-0.2121144));
+            let r28 = r27.mul_add(r28, lit(1.5707288));
+            let r27 = lit(1.0) - r27;
+            let r27 = r27.sqrt();
+            let r27 = r28 * r27;
+            let r28 = lit(3.141592653589793) - r27;
+            let r28 = select(r26.ge(lit(0.0)), r27, r28);
+            let r27 = r15.abs();
+            let r27 = lit(0.999999).min(r27);
+            let r29 = (-lit(0.0187293)).mul_add(r27, lit(0.074261));
+            let r29 = r27.mul_add(r29, lit(-0.2121144));
+            let r29 = r27.mul_add(r29, lit(1.5707288));
+            let r27 = lit(1.0) - r27;
+            let r27 = r27.sqrt();
+            let r27 = r29 * r27;
+            let r29 = lit(3.141592653589793) - r27;
+            let r29 = select(r15.ge(lit(0.0)), r27, r29);
+            let r27 = r28 - r29;
+            let r27 = r27.abs();
+            let r25 = r25 - r27;
+            let r29 = r28 + r29;
+            let r27 = r29 - r27;
+            let r27 = r27.max(lit(0.0001));
+            let r27 = r25 / r27;
+            let r27 = lit(1.0) - r27;
+            let r27 = lit(0.0).max(r27);
+            let r27 = lit(1.0).min(r27);
+            let r25 = r27 * r27;
+            let r27 = (-lit(2.0)).mul_add(r27, lit(3.0));
+            let r27 = r25 * r27;
+            let r26 = r26.max(r15);
+            let r26 = lit(1.0) - r26;
+            let r26 = r27 * r26;
+            let r15 = lit(1.0) - r15;
+            let r15 = r26 / r15;
+            let r26 = lit(1.0) - r15;
+            let texels245 = cubes[1].footprint_at(r8, r12, r10);
+            let texels246 = texels245;
+            let cube = cubes[1];
+            let at = texels245;
+            let [r27, r25, r29, _] = cube.sample_at(&at);
+            let cube = cubes[0];
+            let at = texels246;
+            let [r28, r30, r31, _] = cube.sample_at(&at);
+            let r27 = r27 - r28;
+            let r28 = r9.mul_add(r27, r28);
             let r28 = r15 * r28;
-            let r28 = r24.mul_add(r23, r28);
+            let r28 = r24.mul_add(r26, r28);
             let r28 = r21 * r28;
-            let r23 = r14 * u(172);
-            let r23 = r41.mul_add(u(173), r23);
-            let r23 = r40.mul_add(u(174), r23);
-            let r23 = r30.mul_add(u(175), r23);
-            let r23 = u(165).mul_add(r28, r23);
-            let r23 = r7.mul_add(r10, r23);
-            put(1, i, r23);
-            let r10 = r21 * u(176);
-            let r10 = lit(1.0).min(r10);
-            let r10 = (-u(127)).mul_add(r10, lit(1.0));
-            let r11 = r11.mul_add(u(177), u(178));
-            let r11 = r10 * r11;
-            let r10 = samples(20);
-            let r13 = r13 * u(179);
-            let r13 = r20.mul_add(u(180), r13);
-            let r13 = r19.mul_add(u(181), r13);
-            let r13 = r17.mul_add(u(182), r13);
-            let r17 = kept(11);
-            let r17 = r13 + r17;
-            let r17 = r10 * r17;
-            let r10 = samples(22);
-            let r27 = r27 - r29;
-            let r29 = r9.mul_add(r27, r29);
-            let r29 = r15 * r29;
-            let r29 = r24.mul_add(r10, r29);
-            let r29 = r21 * r29;
-            let r14 = r14 * u(183);
-            let r14 = r41.mul_add(u(184), r14);
-            let r14 = r40.mul_add(u(185), r14);
-            let r14 = r30.mul_add(u(186), r14);
-            let r14 = u(176).mul_add(r29, r14);
-            let r14 = r11.mul_add(r17, r14);
-            put(2, i, r14);
+            let r28 = u(138) * r28;
+            let r24 = r21 * u(154);
+            let r24 = lit(1.0).min(r24);
+            let r24 = (-u(139)).mul_add(r24, lit(1.0));
+            let r27 = r11.mul_add(u(155), u(156));
+            let r27 = r24 * r27;
+            let r24 = samples(17);
+            let r10 = kept(10);
+            let r12 = samples(19);
+            let r25 = r25 - r30;
+            let r30 = r9.mul_add(r25, r30);
+            let r30 = r15 * r30;
+            let r30 = r26.mul_add(r12, r30);
+            let r30 = r21 * r30;
+            let r30 = u(154) * r30;
+            let r12 = r21 * u(157);
+            let r12 = lit(1.0).min(r12);
+            let r12 = (-u(139)).mul_add(r12, lit(1.0));
+            let r11 = r11.mul_add(u(158), u(159));
+            let r11 = r12 * r11;
+            let r12 = samples(20);
+            let r25 = kept(11);
+            let r8 = samples(22);
+            let r29 = r29 - r31;
+            let r31 = r9.mul_add(r29, r31);
+            let r31 = r15 * r31;
+            let r31 = r26.mul_add(r8, r31);
+            let r31 = r21 * r31;
+            let r31 = u(157) * r31;
+            let mut made = [[lit(0.0); 2]; 4];
+            for m in 0..4 {
+                let r21 = kept([3, 4, 5, 6][m]);
+                let r8 = r5 * own(m, 0);
+                let r8 = r3.mul_add(own(m, 1), r8);
+                let r8 = r0.mul_add(own(m, 2), r8);
+                let r26 = select(lit(0.0).lt(r8), r19, lit(0.0));
+                let r15 = own(m, 2) - r1;
+                let r29 = own(m, 1) - r2;
+                let r9 = own(m, 0) - r4;
+                let r32 = r9 * r9;
+                let r32 = r29.mul_add(r29, r32);
+                let r32 = r15.mul_add(r15, r32);
+                let r33 = binary(Binary::Less, lit(1e-12), r32);
+                let r33 = select(r26.ge(lit(0.5)), r33, lit(0.0));
+                let r32 = select(r33.ge(lit(0.5)), r32, lit(1.0));
+                let r26 = r32.sqrt();
+                let r26 = lit(0.5) * r26;
+                let r26 = select(r33.ge(lit(0.5)), r26, lit(1.0));
+                let r34 = r26.mul_add(r26, r23);
+                let r34 = r34.sqrt();
+                let r34 = r26 + r34;
+                let r34 = r34.max(lit(0.1));
+                let r35 = r22 * r34;
+                let r35 = r35 * r35;
+                let r35 = r35 * r35;
+                let r35 = r13 / r35;
+                let r36 = r26.mul_add(r34, lit(-1.0));
+                let r34 = r23 / r34;
+                let r34 = r26.mul_add(r34, lit(1.0));
+                let r34 = r36 / r34;
+                let r34 = r34.mul_add(r34, lit(1.0));
+                let r34 = r35 * r34;
+                let r34 = select(r16.lt(lit(1.0)), r34, lit(1.0));
+                let r35 = r5 * r29;
+                let r35 = (-r3).mul_add(r9, r35);
+                let r36 = r0 * r9;
+                let r36 = (-r5).mul_add(r15, r36);
+                let r9 = r5 * r9;
+                let r9 = r3.mul_add(r29, r9);
+                let r9 = r0.mul_add(r15, r9);
+                let r9 = r9 * r9;
+                let r15 = r3 * r15;
+                let r15 = (-r0).mul_add(r29, r15);
+                let r15 = r15 * r15;
+                let r15 = r14.mul_add(r9, r15);
+                let r15 = r36.mul_add(r36, r15);
+                let r15 = r35.mul_add(r35, r15);
+                let r32 = r15 / r32;
+                let r32 = select(r33.ge(lit(0.5)), r32, lit(1.0));
+                let r15 = lit(3.141592653589793) * r32;
+                let r15 = r32 * r15;
+                let r15 = r14 / r15;
+                let r8 = select(r33.ge(lit(0.5)), r8, lit(1.0));
+                let r32 = select(r33.ge(lit(0.5)), r6, lit(1.0));
+                let r35 = r32 * r32;
+                let r35 = r20.mul_add(r35, r14);
+                let r35 = r35.sqrt();
+                let r36 = r8 * r8;
+                let r36 = r20.mul_add(r36, r14);
+                let r36 = r36.sqrt();
+                let r36 = r32 * r36;
+                let r36 = r8.mul_add(r35, r36);
+                let r36 = lit(1e-6).max(r36);
+                let r36 = lit(0.5) / r36;
+                let r36 = r15 * r36;
+                let r36 = r34 * r36;
+                let r36 = select(r33.ge(lit(0.5)), r36, lit(0.0));
+                let r36 = r21 * r36;
+                made[m] = [r21, r36];
+            }
+            let [r21, r36] = made[0];
+            let [r33, r38] = made[1];
+            let [r29, r40] = made[2];
+            let [r8, r14] = made[3];
+            let r17 = r21.mul_add(u(164), r17);
+            let r17 = r33.mul_add(u(165), r17);
+            let r17 = r29.mul_add(u(166), r17);
+            let r17 = r8.mul_add(u(167), r17);
+            let r17 = r18 * r17;
+            let r28 = u(168).mul_add(r36, r28);
+            let r28 = u(169).mul_add(r38, r28);
+            let r28 = u(170).mul_add(r40, r28);
+            let r28 = u(171).mul_add(r14, r28);
+            let r28 = r7.mul_add(r17, r28);
+            put(0, i, r28);
+            let r10 = r21.mul_add(u(172), r10);
+            let r10 = r33.mul_add(u(173), r10);
+            let r10 = r29.mul_add(u(174), r10);
+            let r10 = r8.mul_add(u(175), r10);
+            let r10 = r24 * r10;
+            let r30 = r36.mul_add(u(176), r30);
+            let r30 = r38.mul_add(u(177), r30);
+            let r30 = r40.mul_add(u(178), r30);
+            let r30 = r14.mul_add(u(179), r30);
+            let r30 = r27.mul_add(r10, r30);
+            put(1, i, r30);
+            let r25 = r21.mul_add(u(180), r25);
+            let r25 = r33.mul_add(u(181), r25);
+            let r25 = r29.mul_add(u(182), r25);
+            let r25 = r8.mul_add(u(183), r25);
+            let r25 = r12 * r25;
+            let r31 = r36.mul_add(u(184), r31);
+            let r31 = r38.mul_add(u(185), r31);
+            let r31 = r40.mul_add(u(186), r31);
+            let r31 = r14.mul_add(u(187), r31);
+            let r31 = r11.mul_add(r25, r31);
+            put(2, i, r31);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn lit_moved<S: Simd>(simd: S, block: Block<'_>) {
+fn lit_moved<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
-        let numbers: &[f32; 241] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let lit = |x: f64| R::splat(simd, x as f32);
+        let numbers: &[f32; 230] = block.uniforms();
+        let u = |k: usize| R::splat(simd, numbers[k]);
+        let of_members = numbers.as_chunks::<3>().0;
+        let own = |m: usize, k: usize| R::splat(simd, of_members[m][k]);
         let fields = block.fields::<23>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<24>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<12>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = samples(2);
             let r1 = kept(0);
             let r2 = samples(4);
@@ -8368,1273 +8279,898 @@ fn lit_moved<S: Simd>(simd: S, block: Block<'_>) {
             let [r10, r11, r12] = point.place();
             let texels31 = cubes[3].footprint_at(r10, r11, r12);
             let texels33 = texels31;
-            let texels513 = texels31;
-            let texels514 = texels31;
+            let texels487 = texels31;
+            let texels488 = texels31;
             let cube = cubes[3];
             let at = texels31;
             let [r7, r9, r8, _] = cube.sample_at(&at);
-            let r13 = u(4) * r7;
+            let r13 = u(16) * r7;
             let cube = cubes[2];
             let at = texels33;
             let [r14, r15, r16, _] = cube.sample_at(&at);
             let r13 = r13 - r14;
-            let r17 = u(4) * r9;
+            let r17 = u(16) * r9;
             let r17 = r17 - r15;
-            let r18 = u(4) * r8;
+            let r18 = u(16) * r8;
             let r18 = r18 - r16;
             let r19 = samples(7);
             let r20 = select(r19.ge(lit(1.2e-38)), r19, lit(1.0));
             let r20 = r20.log2();
-            let r21 = u(6) * r20;
+            let r21 = u(18) * r20;
             let r21 = r21.exp2();
             let r20 = r20 * lit(0.6931471805599453);
             let r20 = r21 * r20;
             let r20 = select(r19.ge(lit(1.2e-38)), r20, lit(0.0));
-            let r21 = select(r19.ge(lit(1.2e-38)), r21, u(8));
+            let r21 = select(r19.ge(lit(1.2e-38)), r21, u(20));
             let r19 = samples(6);
             let r14 = r19.mul_add(r13, r14);
             let r15 = r19.mul_add(r17, r15);
             let r16 = r19.mul_add(r18, r16);
-            let r18 = u(9) * r19;
+            let r18 = u(21) * r19;
             let r18 = -r18;
-            let r17 = (-r19).mul_add(u(10), lit(1.0));
-            let r13 = u(9) * r17;
+            let r17 = (-r19).mul_add(u(22), lit(1.0));
+            let r13 = u(21) * r17;
             let r17 = select(r13.lt(lit(0.05)), lit(0.0), r17);
             let r18 = select(r13.lt(lit(0.05)), lit(0.0), r18);
             let r13 = r13.max(lit(0.05));
-            let r22 = r13 * lit(2.0);
-            let r23 = r13 * r13;
-            let r24 = r23 * r22;
-            let r24 = lit(2.0) * r24;
-            let r25 = r23 * lit(-3.321928);
-            let r25 = r23 * r25;
-            let r25 = r25.exp2();
-            let r26 = r23 * lit(-6.643856);
-            let r27 = r25 * lit(0.6931471805599453);
-            let r27 = r26 * r27;
-            let r28 = binary(Binary::Less, lit(0.0), r25);
-            let r29 = binary(Binary::Less, r25, lit(0.0));
-            let r29 = r28 - r29;
-            let r29 = r27 * r29;
-            let r28 = lit(0.0).max(r4);
-            let r28 = lit(1e-6).max(r28);
-            let r30 = lit(1.0) + r13;
-            let r30 = r28 * r30;
-            let r31 = r28 + r13;
-            let r31 = unary(Unary::Reciprocal, r31);
-            let r30 = r30 * r31;
-            let r32 = r28 - r30;
-            let r31 = r32 * r31;
-            let r30 = r30.sqrt();
-            let r31 = lit(0.5) * r31;
-            let r31 = r31 / r30;
-            let r30 = lit(2.0) * r30;
-            let r30 = r30 - lit(1.0);
-            let r32 = r13 * lit(1.0526316);
-            let r32 = r32 - lit(0.05263158);
-            let r13 = r13 * lit(4.0);
-            let r33 = r30 * lit(-0.0004120192);
-            let r34 = r32.mul_add(lit(0.98937804), lit(0.017514367));
-            let r34 = r33 + r34;
-            let r33 = r33 + r34;
-            let r35 = r32 * lit(-2.7068534);
-            let r36 = r35 + lit(1.8737313);
-            let r35 = r35 + r36;
-            let r35 = r30.mul_add(lit(0.98937804), r35);
-            let r36 = r32.mul_add(r36, lit(0.04185391));
-            let r36 = r30.mul_add(r34, r36);
-            let r33 = r30.mul_add(r33, r36);
-            let r34 = r32 * lit(6.0472665);
-            let r37 = r34 + lit(-4.3290744);
-            let r34 = r34 + r37;
-            let r37 = r32.mul_add(r37, lit(-1.5091898));
-            let r34 = r32.mul_add(r34, r37);
-            let r34 = r30.mul_add(r35, r34);
-            let r37 = r32.mul_add(r37, lit(-0.05214465));
-            let r37 = r30.mul_add(r36, r37);
-            let r33 = r30.mul_add(r33, r37);
-            let r36 = r32 * lit(-33.136127);
-            let r35 = r36 + lit(15.021135);
-            let r36 = r36 + r35;
-            let r35 = r32.mul_add(r35, lit(-0.7565581));
-            let r36 = r32.mul_add(r36, r35);
-            let r35 = r32.mul_add(r35, lit(-4.4350986));
-            let r36 = r32.mul_add(r36, r35);
-            let r36 = r30.mul_add(r34, r36);
-            let r35 = r32.mul_add(r35, lit(-0.1654946));
-            let r35 = r30.mul_add(r37, r35);
-            let r33 = r30.mul_add(r33, r35);
-            let r37 = r32 * lit(20.749594);
-            let r34 = r37 + lit(-18.797396);
-            let r37 = r37 + r34;
-            let r34 = r32.mul_add(r34, lit(2.8044958));
-            let r37 = r32.mul_add(r37, r34);
-            let r34 = r32.mul_add(r34, lit(4.5802555));
-            let r37 = r32.mul_add(r37, r34);
-            let r34 = r32.mul_add(r34, lit(0.67946917));
-            let r37 = r32.mul_add(r37, r34);
-            let r37 = r30.mul_add(r36, r37);
-            let r34 = r32.mul_add(r34, lit(0.03459878));
-            let r34 = r30.mul_add(r35, r34);
-            let r33 = r30.mul_add(r33, r34);
-            let r35 = r32 * lit(-0.6919632);
-            let r36 = r35 + lit(21.897259);
-            let r35 = r35 + r36;
-            let r36 = r32.mul_add(r36, lit(14.292728));
-            let r35 = r32.mul_add(r35, r36);
-            let r36 = r32.mul_add(r36, lit(-6.076299));
-            let r35 = r32.mul_add(r35, r36);
-            let r36 = r32.mul_add(r36, lit(3.5632777));
-            let r35 = r32.mul_add(r35, r36);
-            let r36 = r32.mul_add(r36, lit(2.740612));
-            let r35 = r32.mul_add(r35, r36);
-            let r35 = r30.mul_add(r37, r35);
-            let r36 = r32.mul_add(r36, lit(0.123854704));
-            let r36 = r30.mul_add(r34, r36);
-            let r34 = r30 * lit(-0.73189694);
-            let r37 = r32.mul_add(lit(5.5059476), lit(-2.4792378));
-            let r37 = r34 + r37;
-            let r34 = r34 + r37;
-            let r38 = r32 * lit(-15.361438);
-            let r39 = r38 + lit(15.843192);
-            let r38 = r38 + r39;
-            let r38 = r30.mul_add(lit(5.5059476), r38);
-            let r39 = r32.mul_add(r39, lit(-2.9153898));
-            let r39 = r30.mul_add(r37, r39);
-            let r34 = r30.mul_add(r34, r39);
-            let r37 = r32 * lit(22.008505);
-            let r40 = r37 + lit(-31.626265);
-            let r37 = r37 + r40;
-            let r40 = r32.mul_add(r40, lit(10.849422));
-            let r37 = r32.mul_add(r37, r40);
-            let r37 = r30.mul_add(r38, r37);
-            let r40 = r32.mul_add(r40, lit(0.022259254));
-            let r40 = r30.mul_add(r39, r40);
-            let r34 = r30.mul_add(r34, r40);
-            let r39 = r32 * lit(-32.95722);
-            let r38 = r39 + lit(47.940353);
-            let r39 = r39 + r38;
-            let r38 = r32.mul_add(r38, lit(-24.777008));
-            let r39 = r32.mul_add(r39, r38);
-            let r38 = r32.mul_add(r38, lit(-7.8058953));
-            let r39 = r32.mul_add(r39, r38);
-            let r39 = r30.mul_add(r37, r39);
-            let r38 = r32.mul_add(r38, lit(3.2521393));
-            let r38 = r30.mul_add(r40, r38);
-            let r34 = r30.mul_add(r34, r38);
-            let r40 = r32 * lit(40.38964);
-            let r37 = r40 + lit(-85.03923);
-            let r40 = r40 + r37;
-            let r37 = r32.mul_add(r37, lit(27.656086));
-            let r40 = r32.mul_add(r40, r37);
-            let r37 = r32.mul_add(r37, lit(-0.31556824));
-            let r40 = r32.mul_add(r40, r37);
-            let r37 = r32.mul_add(r37, lit(-10.776063));
-            let r40 = r32.mul_add(r40, r37);
-            let r40 = r30.mul_add(r39, r40);
-            let r37 = r32.mul_add(r37, lit(2.938116));
-            let r37 = r30.mul_add(r38, r37);
-            let r34 = r30.mul_add(r34, r37);
-            let r38 = r32 * lit(11.477421);
-            let r39 = r38 + lit(-28.036684);
-            let r38 = r38 + r39;
-            let r39 = r32.mul_add(r39, lit(86.54406));
-            let r38 = r32.mul_add(r38, r39);
-            let r39 = r32.mul_add(r39, lit(-38.168766));
-            let r38 = r32.mul_add(r38, r39);
-            let r39 = r32.mul_add(r39, lit(31.440067));
-            let r38 = r32.mul_add(r38, r39);
-            let r39 = r32.mul_add(r39, lit(1.5111662));
-            let r38 = r32.mul_add(r38, r39);
-            let r38 = r30.mul_add(r40, r38);
-            let r39 = r32.mul_add(r39, lit(1.0));
-            let r39 = r30.mul_add(r37, r39);
-            let r39 = unary(Unary::Reciprocal, r39);
-            let r36 = r36 * r39;
-            let r33 = (-r36).mul_add(r34, r33);
-            let r35 = (-r36).mul_add(r38, r35);
-            let r33 = r33 * r39;
-            let r33 = r31 * r33;
-            let r39 = r35 * r39;
-            let r39 = lit(1.0526316) * r39;
-            let r39 = lit(2.0).mul_add(r33, r39);
-            let r39 = r36 * r39;
-            let r39 = lit(2.0) * r39;
-            let r36 = (-r36).mul_add(r36, lit(1.0));
-            let r33 = r23 * lit(2.0);
-            let r23 = r23 * r23;
-            let r35 = lit(1.0) + r33;
-            let r35 = r28 * r35;
-            let r33 = r28 + r33;
-            let r33 = unary(Unary::Reciprocal, r33);
-            let r35 = r35 * r33;
-            let r28 = r28 - r35;
-            let r28 = r13 * r28;
-            let r35 = r35.sqrt();
-            let r33 = r28 * r33;
-            let r33 = lit(0.5) * r33;
-            let r33 = r33 / r35;
-            let r35 = lit(1.0) - r35;
-            let r28 = r35 * lit(-51.966053);
-            let r13 = r32.mul_add(lit(-570.10706), lit(294.6542));
-            let r13 = r28 + r13;
-            let r28 = r28 + r13;
-            let r31 = r32 * lit(-1151.2646);
-            let r38 = r31 + lit(2261.705);
-            let r31 = r31 + r38;
-            let r31 = r35.mul_add(lit(-570.10706), r31);
-            let r38 = r32.mul_add(r38, lit(-958.72577));
-            let r38 = r35.mul_add(r13, r38);
-            let r28 = r35.mul_add(r28, r38);
-            let r13 = r32 * lit(3107.8694);
-            let r34 = r13 + lit(771.69995);
-            let r13 = r13 + r34;
-            let r34 = r32.mul_add(r34, lit(-3104.6565));
-            let r13 = r32.mul_add(r13, r34);
-            let r13 = r35.mul_add(r31, r13);
-            let r34 = r32.mul_add(r34, lit(1684.868));
-            let r34 = r35.mul_add(r38, r34);
-            let r28 = r35.mul_add(r28, r34);
-            let r38 = r32 * lit(-2028.784);
-            let r31 = r38 + lit(-2819.9106);
-            let r38 = r38 + r31;
-            let r31 = r32.mul_add(r31, lit(-853.38617));
-            let r38 = r32.mul_add(r38, r31);
-            let r31 = r32.mul_add(r31, lit(2724.646));
-            let r38 = r32.mul_add(r38, r31);
-            let r38 = r35.mul_add(r13, r38);
-            let r31 = r32.mul_add(r31, lit(-1027.6843));
-            let r31 = r35.mul_add(r34, r31);
-            let r28 = r35.mul_add(r28, r31);
-            let r34 = r32 * lit(-78.26518);
-            let r13 = r34 + lit(1147.8971);
-            let r34 = r34 + r13;
-            let r13 = r32.mul_add(r13, lit(1380.4232));
-            let r34 = r32.mul_add(r34, r13);
-            let r13 = r32.mul_add(r13, lit(99.29577));
-            let r34 = r32.mul_add(r34, r13);
-            let r13 = r32.mul_add(r13, lit(-341.66718));
-            let r34 = r32.mul_add(r34, r13);
-            let r34 = r35.mul_add(r38, r34);
-            let r13 = r32.mul_add(r13, lit(402.98117));
-            let r13 = r35.mul_add(r31, r13);
-            let r28 = r35.mul_add(r28, r13);
-            let r31 = r32 * lit(99.87072);
-            let r38 = r31 + lit(403.23367);
-            let r31 = r31 + r38;
-            let r38 = r32.mul_add(r38, lit(-329.77115));
-            let r31 = r32.mul_add(r31, r38);
-            let r38 = r32.mul_add(r38, lit(204.95244));
-            let r31 = r32.mul_add(r31, r38);
-            let r38 = r32.mul_add(r38, lit(-16.22698));
-            let r31 = r32.mul_add(r31, r38);
-            let r38 = r32.mul_add(r38, lit(0.36739597));
-            let r31 = r32.mul_add(r31, r38);
-            let r31 = r35.mul_add(r34, r31);
-            let r38 = r32.mul_add(r38, lit(-0.0013912567));
-            let r38 = r35.mul_add(r13, r38);
-            let r13 = r35 * lit(-52.70797);
-            let r34 = r32.mul_add(lit(-754.39386), lit(291.25507));
-            let r34 = r13 + r34;
-            let r13 = r13 + r34;
-            let r37 = r32 * lit(-1056.3835);
-            let r30 = r37 + lit(2750.1265);
-            let r37 = r37 + r30;
-            let r37 = r35.mul_add(lit(-754.39386), r37);
-            let r30 = r32.mul_add(r30, lit(-946.7237));
-            let r30 = r35.mul_add(r34, r30);
-            let r13 = r35.mul_add(r13, r30);
-            let r34 = r32 * lit(3827.2642);
-            let r40 = r34 + lit(383.2556);
-            let r34 = r34 + r40;
-            let r40 = r32.mul_add(r40, lit(-3586.956));
-            let r34 = r32.mul_add(r34, r40);
-            let r34 = r35.mul_add(r37, r34);
-            let r40 = r32.mul_add(r40, lit(1672.4937));
-            let r40 = r35.mul_add(r30, r40);
-            let r13 = r35.mul_add(r13, r40);
-            let r30 = r32 * lit(-290.88354);
-            let r37 = r30 + lit(-6400.9927);
-            let r30 = r30 + r37;
-            let r37 = r32.mul_add(r37, lit(1070.8275));
-            let r30 = r32.mul_add(r30, r37);
-            let r37 = r32.mul_add(r37, lit(3149.3064));
-            let r30 = r32.mul_add(r30, r37);
-            let r30 = r35.mul_add(r34, r30);
-            let r37 = r32.mul_add(r37, lit(-1016.11487));
-            let r37 = r35.mul_add(r40, r37);
-            let r13 = r35.mul_add(r13, r37);
-            let r40 = r32 * lit(-2368.5022);
-            let r34 = r40 + lit(488.391);
-            let r40 = r40 + r34;
-            let r34 = r32.mul_add(r34, lit(4104.414));
-            let r40 = r32.mul_add(r40, r34);
-            let r34 = r32.mul_add(r34, lit(-850.04376));
-            let r40 = r32.mul_add(r40, r34);
-            let r34 = r32.mul_add(r34, lit(-487.51877));
-            let r40 = r32.mul_add(r40, r34);
-            let r40 = r35.mul_add(r30, r40);
-            let r34 = r32.mul_add(r34, lit(399.00104));
-            let r34 = r35.mul_add(r37, r34);
-            let r13 = r35.mul_add(r13, r34);
-            let r37 = r32 * lit(655.7609);
-            let r30 = r37 + lit(1343.5812);
-            let r37 = r37 + r30;
-            let r30 = r32.mul_add(r30, lit(-120.513466));
-            let r37 = r32.mul_add(r37, r30);
-            let r30 = r32.mul_add(r30, lit(-241.4999));
-            let r37 = r32.mul_add(r37, r30);
-            let r30 = r32.mul_add(r30, lit(299.9503));
-            let r37 = r32.mul_add(r37, r30);
-            let r30 = r32.mul_add(r30, lit(37.510433));
-            let r37 = r32.mul_add(r37, r30);
-            let r37 = r35.mul_add(r40, r37);
-            let r30 = r32.mul_add(r30, lit(1.0));
-            let r30 = r35.mul_add(r34, r30);
-            let r30 = unary(Unary::Reciprocal, r30);
-            let r38 = r38 * r30;
-            let r28 = (-r38).mul_add(r13, r28);
-            let r31 = (-r38).mul_add(r37, r31);
-            let r28 = r28 * r30;
-            let r30 = r31 * r30;
-            let r30 = lit(1.0526316) * r30;
-            let r30 = (-r33).mul_add(r28, r30);
-            let r30 = select(lit(0.0).lt(r38), r30, lit(0.0));
-            let r38 = lit(0.0).max(r38);
-            let r28 = r38 * r30;
-            let r28 = lit(2.0) * r28;
-            let r33 = r38 * r38;
-            let r28 = r33 * r28;
-            let r28 = lit(2.0) * r28;
-            let r33 = r33 * r33;
-            let r28 = r38 * r28;
-            let r28 = r33.mul_add(r30, r28);
-            let r28 = r36 * r28;
-            let r30 = r38 * r33;
-            let r28 = (-r30).mul_add(r39, r28);
-            let r39 = -r39;
-            let r30 = lit(1.0) - r30;
-            let r39 = r39 - r28;
-            let r30 = r36 * r30;
-            let r36 = r38 * r36;
-            let r36 = r33 * r36;
-            let r33 = r19.mul_add(u(129), u(130));
-            let r39 = r33 * r39;
-            let r28 = u(131).mul_add(r39, r28);
-            let r39 = r33 * r30;
-            let r36 = u(131).mul_add(r39, r36);
-            let r22 = r36 * r22;
-            let r39 = r36 * u(132);
-            let r38 = lit(1.0).min(r39);
-            let r38 = (-r38).mul_add(u(133), lit(1.0));
-            let r31 = select(r39.lt(lit(1.0)), r36, lit(0.0));
-            let r39 = select(r39.lt(lit(1.0)), u(132), lit(0.0));
-            let r37 = r21.mul_add(u(134), u(135));
-            let r31 = r37 * r31;
-            let r13 = r37 * r28;
-            let r13 = r39 * r13;
-            let r34 = r30 * r37;
-            let r34 = r39 * r34;
-            let r37 = r38 * r37;
-            let r39 = kept(6);
-            let r35 = kept(5);
-            let r32 = r39 * u(136);
-            let r32 = r35.mul_add(u(137), r32);
-            let r40 = kept(4);
-            let r32 = r40.mul_add(u(138), r32);
-            let r41 = kept(9);
-            let r42 = u(133) * r41;
-            let r42 = -r42;
-            let r43 = kept(3);
-            let r42 = (-r43).mul_add(u(139), r42);
-            let r42 = (-r40).mul_add(u(140), r42);
-            let r42 = (-r35).mul_add(u(141), r42);
-            let r42 = (-r39).mul_add(u(142), r42);
-            let r44 = samples(8);
-            let r45 = r33 * r44;
-            let r45 = r42 * r45;
-            let r42 = r44 * r42;
-            let r46 = r43 * u(143);
-            let r47 = r32 + r46;
-            let r47 = r47 + r41;
-            let r32 = r32 + r41;
-            let r47 = r44 * r47;
-            let r32 = r46 + r32;
-            let r32 = r44 * r32;
-            let r46 = kept(7);
-            let r27 = select(r25.lt(r46), lit(0.0), r27);
-            let r48 = r46.abs();
-            let r48 = r48.min(lit(0.999999));
-            let r49 = (-r48).mul_add(lit(0.0187293), lit(0.074261));
-            let r49 = r48.mul_add(r49, lit(-0.2121144));
-            let r49 = r48.mul_add(r49, lit(1.5707288));
-            let r48 = lit(1.0) - r48;
-            let r48 = r48.sqrt();
-            let r48 = r49 * r48;
-            let r49 = lit(3.141592653589793) - r48;
-            let r49 = select(r46.ge(lit(0.0)), r48, r49);
-            let r46 = r46.max(r25);
-            let r46 = lit(1.0) - r46;
-            let r48 = r25.abs();
-            let r29 = select(r48.lt(lit(0.999999)), r29, lit(0.0));
-            let r48 = lit(0.999999).min(r48);
-            let r50 = lit(0.0187293) * r48;
-            let r51 = lit(0.074261) - r50;
-            let r50 = r51 - r50;
-            let r50 = r29 * r50;
-            let r51 = r48.mul_add(r51, lit(-0.2121144));
-            let r52 = r51 * r29;
-            let r52 = r48.mul_add(r50, r52);
-            let r51 = r48.mul_add(r51, lit(1.5707288));
+            let r22 = r13 * r13;
+            let r23 = r22 * lit(-3.321928);
+            let r23 = r22 * r23;
+            let r23 = r23.exp2();
+            let r24 = r22 * lit(-6.643856);
+            let r25 = r23 * lit(0.6931471805599453);
+            let r25 = r24 * r25;
+            let r26 = binary(Binary::Less, lit(0.0), r23);
+            let r27 = binary(Binary::Less, r23, lit(0.0));
+            let r27 = r26 - r27;
+            let r27 = r25 * r27;
+            let r26 = lit(0.0).max(r4);
+            let r26 = lit(1e-6).max(r26);
+            let r28 = lit(1.0) + r13;
+            let r28 = r26 * r28;
+            let r29 = r26 + r13;
+            let r29 = unary(Unary::Reciprocal, r29);
+            let r28 = r28 * r29;
+            let r30 = r26 - r28;
+            let r29 = r30 * r29;
+            let r28 = r28.sqrt();
             let r29 = lit(0.5) * r29;
+            let r29 = r29 / r28;
+            let r28 = lit(2.0) * r28;
+            let r28 = r28 - lit(1.0);
+            let r30 = r13 * lit(1.0526316);
+            let r30 = r30 - lit(0.05263158);
+            let r31 = r28 * lit(-0.0004120192);
+            let r32 = r30.mul_add(lit(0.98937804), lit(0.017514367));
+            let r32 = r31 + r32;
+            let r31 = r31 + r32;
+            let r33 = r30 * lit(-2.7068534);
+            let r34 = r33 + lit(1.8737313);
+            let r33 = r33 + r34;
+            let r33 = r28.mul_add(lit(0.98937804), r33);
+            let r34 = r30.mul_add(r34, lit(0.04185391));
+            let r34 = r28.mul_add(r32, r34);
+            let r31 = r28.mul_add(r31, r34);
+            let r32 = r30 * lit(6.0472665);
+            let r35 = r32 + lit(-4.3290744);
+            let r32 = r32 + r35;
+            let r35 = r30.mul_add(r35, lit(-1.5091898));
+            let r32 = r30.mul_add(r32, r35);
+            let r32 = r28.mul_add(r33, r32);
+            let r35 = r30.mul_add(r35, lit(-0.05214465));
+            let r35 = r28.mul_add(r34, r35);
+            let r31 = r28.mul_add(r31, r35);
+            let r34 = r30 * lit(-33.136127);
+            let r33 = r34 + lit(15.021135);
+            let r34 = r34 + r33;
+            let r33 = r30.mul_add(r33, lit(-0.7565581));
+            let r34 = r30.mul_add(r34, r33);
+            let r33 = r30.mul_add(r33, lit(-4.4350986));
+            let r34 = r30.mul_add(r34, r33);
+            let r34 = r28.mul_add(r32, r34);
+            let r33 = r30.mul_add(r33, lit(-0.1654946));
+            let r33 = r28.mul_add(r35, r33);
+            let r31 = r28.mul_add(r31, r33);
+            let r35 = r30 * lit(20.749594);
+            let r32 = r35 + lit(-18.797396);
+            let r35 = r35 + r32;
+            let r32 = r30.mul_add(r32, lit(2.8044958));
+            let r35 = r30.mul_add(r35, r32);
+            let r32 = r30.mul_add(r32, lit(4.5802555));
+            let r35 = r30.mul_add(r35, r32);
+            let r32 = r30.mul_add(r32, lit(0.67946917));
+            let r35 = r30.mul_add(r35, r32);
+            let r35 = r28.mul_add(r34, r35);
+            let r32 = r30.mul_add(r32, lit(0.03459878));
+            let r32 = r28.mul_add(r33, r32);
+            let r31 = r28.mul_add(r31, r32);
+            let r33 = r30 * lit(-0.6919632);
+            let r34 = r33 + lit(21.897259);
+            let r33 = r33 + r34;
+            let r34 = r30.mul_add(r34, lit(14.292728));
+            let r33 = r30.mul_add(r33, r34);
+            let r34 = r30.mul_add(r34, lit(-6.076299));
+            let r33 = r30.mul_add(r33, r34);
+            let r34 = r30.mul_add(r34, lit(3.5632777));
+            let r33 = r30.mul_add(r33, r34);
+            let r34 = r30.mul_add(r34, lit(2.740612));
+            let r33 = r30.mul_add(r33, r34);
+            let r33 = r28.mul_add(r35, r33);
+            let r34 = r30.mul_add(r34, lit(0.123854704));
+            let r34 = r28.mul_add(r32, r34);
+            let r32 = r28 * lit(-0.73189694);
+            let r35 = r30.mul_add(lit(5.5059476), lit(-2.4792378));
+            let r35 = r32 + r35;
+            let r32 = r32 + r35;
+            let r36 = r30 * lit(-15.361438);
+            let r37 = r36 + lit(15.843192);
+            let r36 = r36 + r37;
+            let r36 = r28.mul_add(lit(5.5059476), r36);
+            let r37 = r30.mul_add(r37, lit(-2.9153898));
+            let r37 = r28.mul_add(r35, r37);
+            let r32 = r28.mul_add(r32, r37);
+            let r35 = r30 * lit(22.008505);
+            let r38 = r35 + lit(-31.626265);
+            let r35 = r35 + r38;
+            let r38 = r30.mul_add(r38, lit(10.849422));
+            let r35 = r30.mul_add(r35, r38);
+            let r35 = r28.mul_add(r36, r35);
+            let r38 = r30.mul_add(r38, lit(0.022259254));
+            let r38 = r28.mul_add(r37, r38);
+            let r32 = r28.mul_add(r32, r38);
+            let r37 = r30 * lit(-32.95722);
+            let r36 = r37 + lit(47.940353);
+            let r37 = r37 + r36;
+            let r36 = r30.mul_add(r36, lit(-24.777008));
+            let r37 = r30.mul_add(r37, r36);
+            let r36 = r30.mul_add(r36, lit(-7.8058953));
+            let r37 = r30.mul_add(r37, r36);
+            let r37 = r28.mul_add(r35, r37);
+            let r36 = r30.mul_add(r36, lit(3.2521393));
+            let r36 = r28.mul_add(r38, r36);
+            let r32 = r28.mul_add(r32, r36);
+            let r38 = r30 * lit(40.38964);
+            let r35 = r38 + lit(-85.03923);
+            let r38 = r38 + r35;
+            let r35 = r30.mul_add(r35, lit(27.656086));
+            let r38 = r30.mul_add(r38, r35);
+            let r35 = r30.mul_add(r35, lit(-0.31556824));
+            let r38 = r30.mul_add(r38, r35);
+            let r35 = r30.mul_add(r35, lit(-10.776063));
+            let r38 = r30.mul_add(r38, r35);
+            let r38 = r28.mul_add(r37, r38);
+            let r35 = r30.mul_add(r35, lit(2.938116));
+            let r35 = r28.mul_add(r36, r35);
+            let r32 = r28.mul_add(r32, r35);
+            let r36 = r30 * lit(11.477421);
+            let r37 = r36 + lit(-28.036684);
+            let r36 = r36 + r37;
+            let r37 = r30.mul_add(r37, lit(86.54406));
+            let r36 = r30.mul_add(r36, r37);
+            let r37 = r30.mul_add(r37, lit(-38.168766));
+            let r36 = r30.mul_add(r36, r37);
+            let r37 = r30.mul_add(r37, lit(31.440067));
+            let r36 = r30.mul_add(r36, r37);
+            let r37 = r30.mul_add(r37, lit(1.5111662));
+            let r36 = r30.mul_add(r36, r37);
+            let r36 = r28.mul_add(r38, r36);
+            let r37 = r30.mul_add(r37, lit(1.0));
+            let r37 = r28.mul_add(r35, r37);
+            let r37 = unary(Unary::Reciprocal, r37);
+            let r34 = r34 * r37;
+            let r31 = (-r34).mul_add(r32, r31);
+            let r33 = (-r34).mul_add(r36, r33);
+            let r31 = r31 * r37;
+            let r31 = r29 * r31;
+            let r37 = r33 * r37;
+            let r37 = lit(1.0526316) * r37;
+            let r37 = lit(2.0).mul_add(r31, r37);
+            let r37 = r34 * r37;
+            let r37 = lit(2.0) * r37;
+            let r34 = (-r34).mul_add(r34, lit(1.0));
+            let r31 = r22 * lit(2.0);
+            let r33 = lit(1.0) + r31;
+            let r33 = r26 * r33;
+            let r31 = r26 + r31;
+            let r31 = unary(Unary::Reciprocal, r31);
+            let r33 = r33 * r31;
+            let r26 = r26 - r33;
+            let r33 = r33.sqrt();
+            let r29 = r13 * lit(4.0);
+            let r26 = r29 * r26;
+            let r13 = r13 * lit(2.0);
+            let r31 = r26 * r31;
+            let r31 = lit(0.5) * r31;
+            let r31 = r31 / r33;
+            let r33 = lit(1.0) - r33;
+            let r26 = r33 * lit(-51.966053);
+            let r29 = r30.mul_add(lit(-570.10706), lit(294.6542));
+            let r29 = r26 + r29;
+            let r26 = r26 + r29;
+            let r36 = r30 * lit(-1151.2646);
+            let r32 = r36 + lit(2261.705);
+            let r36 = r36 + r32;
+            let r36 = r33.mul_add(lit(-570.10706), r36);
+            let r32 = r30.mul_add(r32, lit(-958.72577));
+            let r32 = r33.mul_add(r29, r32);
+            let r26 = r33.mul_add(r26, r32);
+            let r29 = r30 * lit(3107.8694);
+            let r35 = r29 + lit(771.69995);
+            let r29 = r29 + r35;
+            let r35 = r30.mul_add(r35, lit(-3104.6565));
+            let r29 = r30.mul_add(r29, r35);
+            let r29 = r33.mul_add(r36, r29);
+            let r35 = r30.mul_add(r35, lit(1684.868));
+            let r35 = r33.mul_add(r32, r35);
+            let r26 = r33.mul_add(r26, r35);
+            let r32 = r30 * lit(-2028.784);
+            let r36 = r32 + lit(-2819.9106);
+            let r32 = r32 + r36;
+            let r36 = r30.mul_add(r36, lit(-853.38617));
+            let r32 = r30.mul_add(r32, r36);
+            let r36 = r30.mul_add(r36, lit(2724.646));
+            let r32 = r30.mul_add(r32, r36);
+            let r32 = r33.mul_add(r29, r32);
+            let r36 = r30.mul_add(r36, lit(-1027.6843));
+            let r36 = r33.mul_add(r35, r36);
+            let r26 = r33.mul_add(r26, r36);
+            let r35 = r30 * lit(-78.26518);
+            let r29 = r35 + lit(1147.8971);
+            let r35 = r35 + r29;
+            let r29 = r30.mul_add(r29, lit(1380.4232));
+            let r35 = r30.mul_add(r35, r29);
+            let r29 = r30.mul_add(r29, lit(99.29577));
+            let r35 = r30.mul_add(r35, r29);
+            let r29 = r30.mul_add(r29, lit(-341.66718));
+            let r35 = r30.mul_add(r35, r29);
+            let r35 = r33.mul_add(r32, r35);
+            let r29 = r30.mul_add(r29, lit(402.98117));
+            let r29 = r33.mul_add(r36, r29);
+            let r26 = r33.mul_add(r26, r29);
+            let r36 = r30 * lit(99.87072);
+            let r32 = r36 + lit(403.23367);
+            let r36 = r36 + r32;
+            let r32 = r30.mul_add(r32, lit(-329.77115));
+            let r36 = r30.mul_add(r36, r32);
+            let r32 = r30.mul_add(r32, lit(204.95244));
+            let r36 = r30.mul_add(r36, r32);
+            let r32 = r30.mul_add(r32, lit(-16.22698));
+            let r36 = r30.mul_add(r36, r32);
+            let r32 = r30.mul_add(r32, lit(0.36739597));
+            let r36 = r30.mul_add(r36, r32);
+            let r36 = r33.mul_add(r35, r36);
+            let r32 = r30.mul_add(r32, lit(-0.0013912567));
+            let r32 = r33.mul_add(r29, r32);
+            let r29 = r33 * lit(-52.70797);
+            let r35 = r30.mul_add(lit(-754.39386), lit(291.25507));
+            let r35 = r29 + r35;
+            let r29 = r29 + r35;
+            let r28 = r30 * lit(-1056.3835);
+            let r38 = r28 + lit(2750.1265);
+            let r28 = r28 + r38;
+            let r28 = r33.mul_add(lit(-754.39386), r28);
+            let r38 = r30.mul_add(r38, lit(-946.7237));
+            let r38 = r33.mul_add(r35, r38);
+            let r29 = r33.mul_add(r29, r38);
+            let r35 = r30 * lit(3827.2642);
+            let r39 = r35 + lit(383.2556);
+            let r35 = r35 + r39;
+            let r39 = r30.mul_add(r39, lit(-3586.956));
+            let r35 = r30.mul_add(r35, r39);
+            let r35 = r33.mul_add(r28, r35);
+            let r39 = r30.mul_add(r39, lit(1672.4937));
+            let r39 = r33.mul_add(r38, r39);
+            let r29 = r33.mul_add(r29, r39);
+            let r38 = r30 * lit(-290.88354);
+            let r28 = r38 + lit(-6400.9927);
+            let r38 = r38 + r28;
+            let r28 = r30.mul_add(r28, lit(1070.8275));
+            let r38 = r30.mul_add(r38, r28);
+            let r28 = r30.mul_add(r28, lit(3149.3064));
+            let r38 = r30.mul_add(r38, r28);
+            let r38 = r33.mul_add(r35, r38);
+            let r28 = r30.mul_add(r28, lit(-1016.11487));
+            let r28 = r33.mul_add(r39, r28);
+            let r29 = r33.mul_add(r29, r28);
+            let r39 = r30 * lit(-2368.5022);
+            let r35 = r39 + lit(488.391);
+            let r39 = r39 + r35;
+            let r35 = r30.mul_add(r35, lit(4104.414));
+            let r39 = r30.mul_add(r39, r35);
+            let r35 = r30.mul_add(r35, lit(-850.04376));
+            let r39 = r30.mul_add(r39, r35);
+            let r35 = r30.mul_add(r35, lit(-487.51877));
+            let r39 = r30.mul_add(r39, r35);
+            let r39 = r33.mul_add(r38, r39);
+            let r35 = r30.mul_add(r35, lit(399.00104));
+            let r35 = r33.mul_add(r28, r35);
+            let r29 = r33.mul_add(r29, r35);
+            let r28 = r30 * lit(655.7609);
+            let r38 = r28 + lit(1343.5812);
+            let r28 = r28 + r38;
+            let r38 = r30.mul_add(r38, lit(-120.513466));
+            let r28 = r30.mul_add(r28, r38);
+            let r38 = r30.mul_add(r38, lit(-241.4999));
+            let r28 = r30.mul_add(r28, r38);
+            let r38 = r30.mul_add(r38, lit(299.9503));
+            let r28 = r30.mul_add(r28, r38);
+            let r38 = r30.mul_add(r38, lit(37.510433));
+            let r28 = r30.mul_add(r28, r38);
+            let r28 = r33.mul_add(r39, r28);
+            let r38 = r30.mul_add(r38, lit(1.0));
+            let r38 = r33.mul_add(r35, r38);
+            let r38 = unary(Unary::Reciprocal, r38);
+            let r32 = r32 * r38;
+            let r26 = (-r32).mul_add(r29, r26);
+            let r36 = (-r32).mul_add(r28, r36);
+            let r26 = r26 * r38;
+            let r38 = r36 * r38;
+            let r38 = lit(1.0526316) * r38;
+            let r38 = (-r31).mul_add(r26, r38);
+            let r38 = select(lit(0.0).lt(r32), r38, lit(0.0));
+            let r32 = lit(0.0).max(r32);
+            let r26 = r32 * r38;
+            let r26 = lit(2.0) * r26;
+            let r31 = r32 * r32;
+            let r26 = r31 * r26;
+            let r26 = lit(2.0) * r26;
+            let r31 = r31 * r31;
+            let r26 = r32 * r26;
+            let r26 = r31.mul_add(r38, r26);
+            let r26 = r34 * r26;
+            let r38 = r32 * r31;
+            let r26 = (-r38).mul_add(r37, r26);
+            let r37 = -r37;
+            let r38 = lit(1.0) - r38;
+            let r37 = r37 - r26;
+            let r38 = r34 * r38;
+            let r34 = r32 * r34;
+            let r34 = r31 * r34;
+            let r31 = r19.mul_add(u(141), u(142));
+            let r37 = r31 * r37;
+            let r26 = u(143).mul_add(r37, r26);
+            let r37 = r31 * r38;
+            let r34 = u(143).mul_add(r37, r34);
+            let r37 = r34 * u(144);
+            let r32 = lit(1.0).min(r37);
+            let r32 = (-r32).mul_add(u(145), lit(1.0));
+            let r36 = select(r37.lt(lit(1.0)), r34, lit(0.0));
+            let r37 = select(r37.lt(lit(1.0)), u(144), lit(0.0));
+            let r28 = r21.mul_add(u(146), u(147));
+            let r36 = r28 * r36;
+            let r29 = r28 * r26;
+            let r29 = r37 * r29;
+            let r35 = r38 * r28;
+            let r35 = r37 * r35;
+            let r28 = r32 * r28;
+            let r37 = kept(9);
+            let r33 = u(145) * r37;
+            let r33 = -r33;
+            let r30 = u(143) * r31;
+            let r39 = select(r30.lt(lit(1.0)), r30, lit(0.0));
+            let r40 = r39.max(lit(1e-24));
+            let r40 = r40.sqrt();
+            let r41 = lit(1.0) - r40;
+            let r42 = r41 * r41;
+            let r42 = unary(Unary::Reciprocal, r42);
+            let r43 = r40 * lit(4.0);
+            let r43 = r43 * r42;
+            let r44 = kept(7);
+            let r25 = select(r23.lt(r44), lit(0.0), r25);
+            let r45 = r44.abs();
+            let r45 = r45.min(lit(0.999999));
+            let r46 = (-r45).mul_add(lit(0.0187293), lit(0.074261));
+            let r46 = r45.mul_add(r46, lit(-0.2121144));
+            let r46 = r45.mul_add(r46, lit(1.5707288));
+            let r45 = lit(1.0) - r45;
+            let r45 = r45.sqrt();
+            let r45 = r46 * r45;
+            let r46 = lit(3.141592653589793) - r45;
+            let r46 = select(r44.ge(lit(0.0)), r45, r46);
+            let r44 = r44.max(r23);
+            let r44 = lit(1.0) - r44;
+            let r45 = r23.abs();
+            let r27 = select(r45.lt(lit(0.999999)), r27, lit(0.0));
+            let r45 = lit(0.999999).min(r45);
+            let r47 = lit(0.0187293) * r45;
+            let r48 = lit(0.074261) - r47;
+            let r47 = r48 - r47;
+            let r47 = r27 * r47;
+            let r48 = r45.mul_add(r48, lit(-0.2121144));
+            let r49 = r48 * r27;
+            let r49 = r45.mul_add(r47, r49);
+            let r48 = r45.mul_add(r48, lit(1.5707288));
+            let r27 = lit(0.5) * r27;
+            let r45 = lit(1.0) - r45;
+            let r45 = r45.sqrt();
+            let r49 = r45 * r49;
+            let r27 = r27 / r45;
+            let r27 = r48 * r27;
+            let r45 = r48 * r45;
+            let r48 = r27 - r49;
+            let r27 = r49 - r27;
+            let r48 = select(r23.ge(lit(0.0)), r27, r48);
+            let r27 = lit(3.141592653589793) - r45;
+            let r27 = select(r23.ge(lit(0.0)), r45, r27);
+            let r45 = r46 - r27;
+            let r27 = r46 + r27;
+            let r46 = binary(Binary::Less, lit(0.0), r45);
+            let r49 = binary(Binary::Less, r45, lit(0.0));
+            let r49 = r46 - r49;
+            let r45 = r45.abs();
+            let r46 = lit(1.0) + r49;
+            let r46 = r48 * r46;
+            let r49 = r48 * r49;
+            let r48 = kept(8);
+            let r48 = r48 - r45;
+            let r45 = r27 - r45;
+            let r46 = select(lit(0.0001).lt(r45), r46, lit(0.0));
+            let r45 = r45.max(lit(0.0001));
+            let r45 = unary(Unary::Reciprocal, r45);
+            let r48 = r48 * r45;
+            let r49 = (-r48).mul_add(r46, r49);
+            let r45 = r49 * r45;
             let r48 = lit(1.0) - r48;
-            let r48 = r48.sqrt();
-            let r52 = r48 * r52;
-            let r29 = r29 / r48;
-            let r29 = r51 * r29;
-            let r48 = r51 * r48;
-            let r51 = r29 - r52;
-            let r29 = r52 - r29;
-            let r51 = select(r25.ge(lit(0.0)), r29, r51);
-            let r29 = lit(3.141592653589793) - r48;
-            let r29 = select(r25.ge(lit(0.0)), r48, r29);
-            let r48 = r49 - r29;
-            let r29 = r49 + r29;
-            let r49 = binary(Binary::Less, lit(0.0), r48);
-            let r52 = binary(Binary::Less, r48, lit(0.0));
-            let r52 = r49 - r52;
-            let r48 = r48.abs();
-            let r49 = lit(1.0) + r52;
-            let r49 = r51 * r49;
-            let r52 = r51 * r52;
-            let r51 = kept(8);
-            let r51 = r51 - r48;
-            let r48 = r29 - r48;
-            let r49 = select(lit(0.0001).lt(r48), r49, lit(0.0));
-            let r48 = r48.max(lit(0.0001));
+            let r45 = -r45;
+            let r45 = select(lit(0.0).lt(r48), r45, lit(0.0));
+            let r48 = lit(0.0).max(r48);
+            let r45 = select(r48.lt(lit(1.0)), r45, lit(0.0));
+            let r48 = lit(1.0).min(r48);
+            let r49 = r48 * r45;
+            let r49 = lit(2.0) * r49;
+            let r46 = r48 * r48;
+            let r45 = r46 * r45;
+            let r48 = (-lit(2.0)).mul_add(r48, lit(3.0));
+            let r49 = r48 * r49;
+            let r49 = (-lit(2.0)).mul_add(r45, r49);
+            let r48 = r46 * r48;
+            let r49 = r44 * r49;
+            let r49 = (-r48).mul_add(r25, r49);
+            let r44 = r48 * r44;
+            let r48 = lit(1.0) - r23;
             let r48 = unary(Unary::Reciprocal, r48);
-            let r51 = r51 * r48;
-            let r52 = (-r51).mul_add(r49, r52);
-            let r48 = r52 * r48;
-            let r51 = lit(1.0) - r51;
-            let r48 = -r48;
-            let r48 = select(lit(0.0).lt(r51), r48, lit(0.0));
-            let r51 = lit(0.0).max(r51);
-            let r48 = select(r51.lt(lit(1.0)), r48, lit(0.0));
-            let r51 = lit(1.0).min(r51);
-            let r52 = r51 * r48;
-            let r52 = lit(2.0) * r52;
-            let r49 = r51 * r51;
+            let r44 = r44 * r48;
+            let r23 = r23 * r44;
+            let r23 = r24 * r23;
+            let r49 = lit(0.6931471805599453).mul_add(r23, r49);
             let r48 = r49 * r48;
-            let r51 = (-lit(2.0)).mul_add(r51, lit(3.0));
-            let r52 = r51 * r52;
-            let r52 = (-lit(2.0)).mul_add(r48, r52);
-            let r51 = r49 * r51;
-            let r52 = r46 * r52;
-            let r52 = (-r51).mul_add(r27, r52);
-            let r46 = r51 * r46;
-            let r51 = lit(1.0) - r25;
-            let r51 = unary(Unary::Reciprocal, r51);
-            let r46 = r46 * r51;
-            let r25 = r25 * r46;
-            let r25 = r26 * r25;
-            let r52 = lit(0.6931471805599453).mul_add(r25, r52);
-            let r51 = r52 * r51;
-            let r22 = r51 * r22;
-            let r51 = r36 * r46;
-            let r7 = r51 * r7;
-            let r9 = r51 * r9;
-            let r8 = r51 * r8;
+            let r49 = r34 * r44;
+            let r7 = r49 * r7;
+            let r9 = r49 * r9;
+            let r8 = r49 * r8;
             let r7 = r19 * r7;
             let r9 = r19 * r9;
             let r8 = r19 * r8;
-            let r52 = r46.mul_add(r28, r22);
-            let r25 = r52 * r18;
-            let r52 = r17 * r52;
-            let r26 = lit(1.0) - r46;
-            let r27 = r26 * r28;
-            let r22 = r27 - r22;
-            let r27 = r22 * r18;
-            let r22 = r17 * r22;
             let cube = cubes[0];
-            let at = texels513;
-            let [r49, r48, r29, _] = cube.sample_at(&at);
+            let at = texels487;
+            let [r23, r24, r25, _] = cube.sample_at(&at);
             let cube = cubes[1];
-            let at = texels514;
-            let [r50, r53, r54, _] = cube.sample_at(&at);
-            let r50 = r50 - r49;
-            let r53 = r53 - r48;
-            let r54 = r54 - r29;
-            let r49 = r19.mul_add(r50, r49);
-            let r48 = r19.mul_add(r53, r48);
-            let r29 = r19.mul_add(r54, r29);
-            let r54 = r49 * r52;
-            let r54 = r51.mul_add(r14, r54);
-            let r14 = samples(16);
-            let r54 = r14.mul_add(r22, r54);
-            let r54 = u(132) * r54;
-            let r19 = r49 * r25;
-            let r19 = u(152).mul_add(r7, r19);
-            let r49 = r46 * r49;
-            let r19 = r14.mul_add(r27, r19);
-            let r19 = u(132) * r19;
-            let r49 = r14.mul_add(r26, r49);
-            let r14 = r30 * r49;
-            let r14 = r33 * r14;
-            let r49 = r36 * r49;
-            let r7 = r1 * u(153);
-            let r7 = r3.mul_add(u(154), r7);
-            let r7 = r5.mul_add(u(155), r7);
-            let r53 = u(153) - r0;
-            let r50 = u(154) - r2;
-            let r12 = r53 * r53;
-            let r12 = r50.mul_add(r50, r12);
-            let r11 = u(155) - r6;
-            let r12 = r11.mul_add(r11, r12);
-            let r10 = binary(Binary::Less, lit(0.0), r4);
-            let r55 = select(lit(0.0).lt(r7), r10, lit(0.0));
-            let r56 = binary(Binary::Less, lit(1e-12), r12);
-            let r56 = select(r55.ge(lit(0.5)), r56, lit(0.0));
-            let r12 = select(r56.ge(lit(0.5)), r12, lit(1.0));
-            let r7 = select(r56.ge(lit(0.5)), r7, lit(1.0));
-            let r55 = u(131) * r33;
-            let r57 = select(r55.lt(lit(1.0)), r33, lit(0.0));
-            let r58 = select(r55.lt(lit(1.0)), r55, lit(0.0));
-            let r59 = select(lit(1e-24).lt(r58), r57, lit(0.0));
-            let r59 = lit(0.5) * r59;
-            let r57 = lit(8.0) * r57;
-            let r60 = r58.max(lit(1e-24));
-            let r60 = r60.sqrt();
-            let r58 = r58 * lit(8.0);
-            let r59 = r59 / r60;
-            let r61 = lit(1.0) - r60;
-            let r60 = r60 * lit(4.0);
-            let r62 = r61 * r59;
-            let r62 = r62 * lit(-2.0);
-            let r63 = r12.sqrt();
+            let at = texels488;
+            let [r46, r45, r27, _] = cube.sample_at(&at);
+            let r46 = r46 - r23;
+            let r45 = r45 - r24;
+            let r27 = r27 - r25;
+            let r23 = r19.mul_add(r46, r23);
+            let r24 = r19.mul_add(r45, r24);
+            let r25 = r19.mul_add(r27, r25);
+            let r27 = samples(16);
+            let r19 = lit(1.0) - r44;
+            let r45 = r44 * r23;
+            let r45 = r27.mul_add(r19, r45);
+            let r46 = r38 * r45;
+            let r46 = r31 * r46;
+            let r45 = r34 * r45;
+            let r46 = u(144) * r46;
+            let r12 = r34 * u(157);
+            let r11 = lit(1.0).min(r12);
+            let r11 = (-u(145)).mul_add(r11, lit(1.0));
+            let r10 = select(r12.lt(lit(1.0)), r34, lit(0.0));
+            let r12 = select(r12.lt(lit(1.0)), u(157), lit(0.0));
+            let r47 = r21.mul_add(u(158), u(159));
+            let r10 = r47 * r10;
+            let r50 = r47 * r26;
+            let r50 = r12 * r50;
+            let r51 = r38 * r47;
+            let r51 = r12 * r51;
+            let r47 = r11 * r47;
+            let r12 = kept(10);
+            let r52 = u(145) * r12;
+            let r52 = -r52;
+            let r53 = samples(19);
+            let r54 = r44 * r24;
+            let r54 = r19.mul_add(r53, r54);
+            let r55 = r38 * r54;
+            let r55 = r31 * r55;
+            let r54 = r34 * r54;
+            let r55 = u(157) * r55;
+            let r56 = r34 * u(160);
+            let r57 = lit(1.0).min(r56);
+            let r57 = (-u(145)).mul_add(r57, lit(1.0));
+            let r58 = select(r56.lt(lit(1.0)), r34, lit(0.0));
+            let r56 = select(r56.lt(lit(1.0)), u(160), lit(0.0));
+            let r59 = r21.mul_add(u(161), u(162));
+            let r58 = r59 * r58;
+            let r60 = r59 * r26;
+            let r60 = r56 * r60;
+            let r61 = r38 * r59;
+            let r61 = r56 * r61;
+            let r59 = r57 * r59;
+            let r56 = kept(11);
+            let r62 = u(145) * r56;
+            let r62 = -r62;
+            let r63 = samples(22);
+            let r64 = r44 * r25;
+            let r64 = r19.mul_add(r63, r64);
+            let r38 = r38 * r64;
+            let r19 = r19 * r26;
+            let r38 = r31 * r38;
+            let r64 = r34 * r64;
+            let r38 = u(160) * r38;
+            let r34 = r34 * r13;
+            let r34 = r48 * r34;
+            let r13 = r22 * r13;
+            let r19 = r19 - r34;
+            let r13 = lit(2.0) * r13;
+            let r22 = r22 * r22;
+            let r34 = r44.mul_add(r26, r34);
+            let r26 = r17 * r34;
+            let r34 = r34 * r18;
+            let r44 = r23 * r26;
+            let r44 = r49.mul_add(r14, r44);
+            let r23 = r23 * r34;
+            let r23 = u(163).mul_add(r7, r23);
+            let r7 = r17 * r19;
+            let r44 = r27.mul_add(r7, r44);
+            let r19 = r19 * r18;
+            let r44 = u(144) * r44;
+            let r23 = r27.mul_add(r19, r23);
+            let r23 = u(144) * r23;
+            let r27 = r24 * r26;
+            let r27 = r49.mul_add(r15, r27);
+            let r26 = r25 * r26;
+            let r24 = r24 * r34;
+            let r27 = r53.mul_add(r7, r27);
+            let r26 = r49.mul_add(r16, r26);
+            let r24 = u(163).mul_add(r9, r24);
+            let r34 = r25 * r34;
+            let r27 = u(157) * r27;
+            let r26 = r63.mul_add(r7, r26);
+            let r24 = r53.mul_add(r19, r24);
+            let r34 = u(163).mul_add(r8, r34);
+            let r26 = u(160) * r26;
+            let r24 = u(157) * r24;
+            let r34 = r63.mul_add(r19, r34);
+            let r34 = u(160) * r34;
+            let r19 = select(r30.lt(lit(1.0)), r31, lit(0.0));
+            let r63 = select(lit(1e-24).lt(r39), r19, lit(0.0));
             let r63 = lit(0.5) * r63;
-            let r12 = unary(Unary::Reciprocal, r12);
-            let r63 = select(r56.ge(lit(0.5)), r63, lit(1.0));
-            let r64 = r61 * r61;
-            let r64 = unary(Unary::Reciprocal, r64);
-            let r60 = r60 * r64;
-            let r65 = lit(4.0) * r59;
-            let r65 = (-r60).mul_add(r62, r65);
-            let r64 = r65 * r64;
-            let r65 = r63.mul_add(r63, r60);
-            let r65 = r65.sqrt();
-            let r62 = lit(0.5) * r64;
-            let r66 = r63 + r65;
-            let r65 = r62 / r65;
-            let r65 = select(lit(0.1).lt(r66), r65, lit(0.0));
-            let r66 = lit(0.1).max(r66);
-            let r67 = r61 * r65;
-            let r67 = (-r66).mul_add(r59, r67);
-            let r68 = r61 * r66;
-            let r67 = r68 * r67;
-            let r67 = lit(2.0) * r67;
-            let r68 = r68 * r68;
-            let r67 = r68 * r67;
-            let r67 = lit(2.0) * r67;
-            let r68 = r68 * r68;
-            let r68 = unary(Unary::Reciprocal, r68);
-            let r69 = r58 * r68;
-            let r67 = (-r69).mul_add(r67, r57);
-            let r68 = r67 * r68;
-            let r67 = r63 * r66;
-            let r67 = r67 - lit(1.0);
-            let r66 = unary(Unary::Reciprocal, r66);
-            let r70 = r60 * r66;
-            let r71 = (-r70).mul_add(r65, r64);
-            let r66 = r71 * r66;
-            let r70 = r63.mul_add(r70, lit(1.0));
-            let r70 = unary(Unary::Reciprocal, r70);
-            let r67 = r67 * r70;
-            let r65 = (-r67).mul_add(r66, r65);
-            let r65 = r63 * r65;
-            let r70 = r65 * r70;
-            let r70 = r67 * r70;
-            let r70 = lit(2.0) * r70;
-            let r67 = r67.mul_add(r67, lit(1.0));
-            let r68 = r67 * r68;
-            let r68 = r69.mul_add(r70, r68);
-            let r68 = select(r55.lt(lit(1.0)), r68, lit(0.0));
-            let r67 = r69 * r67;
-            let r67 = select(r55.lt(lit(1.0)), r67, lit(1.0));
-            let r69 = r1 * r53;
-            let r69 = r3.mul_add(r50, r69);
-            let r69 = r5.mul_add(r11, r69);
-            let r69 = r69 * r69;
-            let r70 = r1 * r50;
-            let r70 = (-r3).mul_add(r53, r70);
-            let r53 = r5 * r53;
-            let r53 = (-r1).mul_add(r11, r53);
-            let r11 = r3 * r11;
-            let r11 = (-r5).mul_add(r50, r11);
-            let r11 = r11 * r11;
-            let r11 = r53.mul_add(r53, r11);
-            let r11 = r70.mul_add(r70, r11);
-            let r11 = r23.mul_add(r69, r11);
-            let r69 = r69 * r24;
-            let r69 = r69 * r12;
-            let r69 = select(r56.ge(lit(0.5)), r69, lit(0.0));
-            let r12 = r11 * r12;
-            let r12 = select(r56.ge(lit(0.5)), r12, lit(1.0));
-            let r69 = r12 * r69;
-            let r69 = lit(6.283185307179586) * r69;
-            let r11 = lit(3.141592653589793) * r12;
-            let r11 = r12 * r11;
-            let r11 = unary(Unary::Reciprocal, r11);
-            let r12 = r23 * r11;
-            let r69 = (-r12).mul_add(r69, r24);
-            let r11 = r69 * r11;
-            let r69 = select(r56.ge(lit(0.5)), r4, lit(1.0));
-            let r70 = r69 * r69;
-            let r53 = lit(1.0) - r70;
-            let r53 = r24 * r53;
-            let r53 = lit(0.5) * r53;
-            let r50 = lit(1.0) - r23;
-            let r70 = r50.mul_add(r70, r23);
-            let r70 = r70.sqrt();
-            let r53 = r53 / r70;
-            let r65 = r7 * r7;
-            let r63 = lit(1.0) - r65;
-            let r63 = r24 * r63;
-            let r65 = r50.mul_add(r65, r23);
-            let r63 = lit(0.5) * r63;
-            let r65 = r65.sqrt();
-            let r63 = r63 / r65;
-            let r63 = r69 * r63;
-            let r63 = r7.mul_add(r53, r63);
-            let r65 = r69 * r65;
-            let r65 = r7.mul_add(r70, r65);
-            let r63 = select(lit(1e-6).lt(r65), r63, lit(0.0));
-            let r65 = lit(1e-6).max(r65);
-            let r65 = unary(Unary::Reciprocal, r65);
-            let r70 = lit(0.5) * r65;
-            let r63 = r70 * r63;
-            let r11 = r70 * r11;
-            let r65 = r63 * r65;
-            let r11 = (-r12).mul_add(r65, r11);
-            let r11 = r67 * r11;
-            let r70 = r12 * r70;
-            let r11 = select(r56.ge(lit(0.5)), r11, lit(0.0));
-            let r68 = r70 * r68;
-            let r11 = r43 * r11;
-            let r68 = select(r56.ge(lit(0.5)), r68, lit(0.0));
-            let r70 = r67 * r70;
-            let r68 = r43 * r68;
-            let r70 = select(r56.ge(lit(0.5)), r70, lit(0.0));
-            let r70 = r43 * r70;
-            let r56 = r1 * u(162);
-            let r56 = r3.mul_add(u(163), r56);
-            let r56 = r5.mul_add(u(164), r56);
-            let r67 = u(162) - r0;
-            let r12 = u(163) - r2;
-            let r65 = r67 * r67;
-            let r65 = r12.mul_add(r12, r65);
-            let r63 = u(164) - r6;
-            let r65 = r63.mul_add(r63, r65);
-            let r7 = select(lit(0.0).lt(r56), r10, lit(0.0));
-            let r69 = binary(Binary::Less, lit(1e-12), r65);
-            let r69 = select(r7.ge(lit(0.5)), r69, lit(0.0));
-            let r65 = select(r69.ge(lit(0.5)), r65, lit(1.0));
-            let r56 = select(r69.ge(lit(0.5)), r56, lit(1.0));
-            let r7 = r65.sqrt();
-            let r7 = lit(0.5) * r7;
-            let r65 = unary(Unary::Reciprocal, r65);
-            let r7 = select(r69.ge(lit(0.5)), r7, lit(1.0));
-            let r53 = r7.mul_add(r7, r60);
-            let r53 = r53.sqrt();
-            let r66 = r7 + r53;
-            let r53 = r62 / r53;
-            let r53 = select(lit(0.1).lt(r66), r53, lit(0.0));
-            let r66 = lit(0.1).max(r66);
-            let r71 = r61 * r53;
-            let r71 = (-r66).mul_add(r59, r71);
-            let r72 = r61 * r66;
-            let r71 = r72 * r71;
-            let r71 = lit(2.0) * r71;
-            let r72 = r72 * r72;
-            let r71 = r72 * r71;
-            let r71 = lit(2.0) * r71;
-            let r72 = r72 * r72;
-            let r72 = unary(Unary::Reciprocal, r72);
-            let r73 = r58 * r72;
-            let r71 = (-r73).mul_add(r71, r57);
-            let r72 = r71 * r72;
-            let r71 = r7 * r66;
-            let r71 = r71 - lit(1.0);
-            let r66 = unary(Unary::Reciprocal, r66);
-            let r74 = r60 * r66;
-            let r75 = (-r74).mul_add(r53, r64);
-            let r66 = r75 * r66;
-            let r74 = r7.mul_add(r74, lit(1.0));
-            let r74 = unary(Unary::Reciprocal, r74);
-            let r71 = r71 * r74;
-            let r53 = (-r71).mul_add(r66, r53);
-            let r53 = r7 * r53;
-            let r74 = r53 * r74;
-            let r74 = r71 * r74;
-            let r74 = lit(2.0) * r74;
-            let r71 = r71.mul_add(r71, lit(1.0));
-            let r72 = r71 * r72;
-            let r72 = r73.mul_add(r74, r72);
-            let r72 = select(r55.lt(lit(1.0)), r72, lit(0.0));
-            let r71 = r73 * r71;
-            let r71 = select(r55.lt(lit(1.0)), r71, lit(1.0));
-            let r73 = r1 * r67;
-            let r73 = r3.mul_add(r12, r73);
-            let r73 = r5.mul_add(r63, r73);
-            let r73 = r73 * r73;
-            let r74 = r1 * r12;
-            let r74 = (-r3).mul_add(r67, r74);
-            let r67 = r5 * r67;
-            let r67 = (-r1).mul_add(r63, r67);
-            let r63 = r3 * r63;
-            let r63 = (-r5).mul_add(r12, r63);
-            let r63 = r63 * r63;
-            let r63 = r67.mul_add(r67, r63);
-            let r63 = r74.mul_add(r74, r63);
-            let r63 = r23.mul_add(r73, r63);
-            let r73 = r73 * r24;
-            let r73 = r73 * r65;
-            let r73 = select(r69.ge(lit(0.5)), r73, lit(0.0));
-            let r65 = r63 * r65;
-            let r65 = select(r69.ge(lit(0.5)), r65, lit(1.0));
-            let r73 = r65 * r73;
-            let r73 = lit(6.283185307179586) * r73;
-            let r63 = lit(3.141592653589793) * r65;
-            let r63 = r65 * r63;
-            let r63 = unary(Unary::Reciprocal, r63);
-            let r65 = r23 * r63;
-            let r73 = (-r65).mul_add(r73, r24);
-            let r63 = r73 * r63;
-            let r73 = select(r69.ge(lit(0.5)), r4, lit(1.0));
-            let r74 = r73 * r73;
-            let r67 = lit(1.0) - r74;
-            let r67 = r24 * r67;
-            let r74 = r50.mul_add(r74, r23);
-            let r67 = lit(0.5) * r67;
-            let r74 = r74.sqrt();
-            let r67 = r67 / r74;
-            let r12 = r56 * r56;
-            let r53 = lit(1.0) - r12;
-            let r53 = r24 * r53;
-            let r12 = r50.mul_add(r12, r23);
-            let r53 = lit(0.5) * r53;
-            let r12 = r12.sqrt();
-            let r53 = r53 / r12;
-            let r53 = r73 * r53;
-            let r53 = r56.mul_add(r67, r53);
-            let r12 = r73 * r12;
-            let r12 = r56.mul_add(r74, r12);
-            let r53 = select(lit(1e-6).lt(r12), r53, lit(0.0));
-            let r12 = lit(1e-6).max(r12);
-            let r12 = unary(Unary::Reciprocal, r12);
-            let r74 = lit(0.5) * r12;
-            let r53 = r74 * r53;
-            let r63 = r74 * r63;
-            let r12 = r53 * r12;
-            let r63 = (-r65).mul_add(r12, r63);
-            let r63 = r71 * r63;
-            let r74 = r65 * r74;
-            let r63 = select(r69.ge(lit(0.5)), r63, lit(0.0));
-            let r72 = r74 * r72;
-            let r63 = r40 * r63;
-            let r72 = select(r69.ge(lit(0.5)), r72, lit(0.0));
-            let r74 = r71 * r74;
-            let r72 = r40 * r72;
-            let r74 = select(r69.ge(lit(0.5)), r74, lit(0.0));
-            let r74 = r40 * r74;
-            let r69 = r1 * u(165);
-            let r69 = r3.mul_add(u(166), r69);
-            let r69 = r5.mul_add(u(167), r69);
-            let r71 = u(165) - r0;
-            let r0 = u(168) - r0;
-            let r65 = u(166) - r2;
-            let r2 = u(169) - r2;
-            let r12 = r71 * r71;
-            let r12 = r65.mul_add(r65, r12);
-            let r53 = u(167) - r6;
-            let r12 = r53.mul_add(r53, r12);
-            let r6 = u(170) - r6;
-            let r56 = select(lit(0.0).lt(r69), r10, lit(0.0));
-            let r73 = binary(Binary::Less, lit(1e-12), r12);
-            let r73 = select(r56.ge(lit(0.5)), r73, lit(0.0));
-            let r12 = select(r73.ge(lit(0.5)), r12, lit(1.0));
-            let r69 = select(r73.ge(lit(0.5)), r69, lit(1.0));
-            let r56 = r12.sqrt();
-            let r56 = lit(0.5) * r56;
-            let r12 = unary(Unary::Reciprocal, r12);
-            let r56 = select(r73.ge(lit(0.5)), r56, lit(1.0));
-            let r67 = r56.mul_add(r56, r60);
-            let r67 = r67.sqrt();
-            let r7 = r56 + r67;
-            let r67 = r62 / r67;
-            let r67 = select(lit(0.1).lt(r7), r67, lit(0.0));
-            let r7 = lit(0.1).max(r7);
-            let r66 = r61 * r67;
-            let r66 = (-r7).mul_add(r59, r66);
-            let r75 = r61 * r7;
-            let r66 = r75 * r66;
-            let r66 = lit(2.0) * r66;
-            let r75 = r75 * r75;
-            let r66 = r75 * r66;
-            let r66 = lit(2.0) * r66;
-            let r75 = r75 * r75;
-            let r75 = unary(Unary::Reciprocal, r75);
-            let r76 = r58 * r75;
-            let r66 = (-r76).mul_add(r66, r57);
-            let r75 = r66 * r75;
-            let r66 = r56 * r7;
-            let r66 = r66 - lit(1.0);
-            let r7 = unary(Unary::Reciprocal, r7);
-            let r77 = r60 * r7;
-            let r78 = (-r77).mul_add(r67, r64);
-            let r7 = r78 * r7;
-            let r77 = r56.mul_add(r77, lit(1.0));
-            let r77 = unary(Unary::Reciprocal, r77);
-            let r66 = r66 * r77;
-            let r67 = (-r66).mul_add(r7, r67);
-            let r67 = r56 * r67;
-            let r77 = r67 * r77;
-            let r77 = r66 * r77;
-            let r77 = lit(2.0) * r77;
-            let r66 = r66.mul_add(r66, lit(1.0));
-            let r75 = r66 * r75;
-            let r75 = r76.mul_add(r77, r75);
-            let r75 = select(r55.lt(lit(1.0)), r75, lit(0.0));
-            let r66 = r76 * r66;
-            let r66 = select(r55.lt(lit(1.0)), r66, lit(1.0));
-            let r76 = r1 * r71;
-            let r76 = r3.mul_add(r65, r76);
-            let r76 = r5.mul_add(r53, r76);
-            let r76 = r76 * r76;
-            let r77 = r1 * r65;
-            let r77 = (-r3).mul_add(r71, r77);
-            let r71 = r5 * r71;
-            let r71 = (-r1).mul_add(r53, r71);
-            let r53 = r3 * r53;
-            let r53 = (-r5).mul_add(r65, r53);
-            let r53 = r53 * r53;
-            let r53 = r71.mul_add(r71, r53);
-            let r53 = r77.mul_add(r77, r53);
-            let r53 = r23.mul_add(r76, r53);
-            let r76 = r76 * r24;
-            let r76 = r76 * r12;
-            let r76 = select(r73.ge(lit(0.5)), r76, lit(0.0));
-            let r12 = r53 * r12;
-            let r12 = select(r73.ge(lit(0.5)), r12, lit(1.0));
-            let r76 = r12 * r76;
-            let r76 = lit(6.283185307179586) * r76;
-            let r53 = lit(3.141592653589793) * r12;
-            let r53 = r12 * r53;
-            let r53 = unary(Unary::Reciprocal, r53);
-            let r12 = r23 * r53;
-            let r76 = (-r12).mul_add(r76, r24);
-            let r53 = r76 * r53;
-            let r76 = select(r73.ge(lit(0.5)), r4, lit(1.0));
-            let r77 = r76 * r76;
-            let r71 = lit(1.0) - r77;
-            let r71 = r24 * r71;
-            let r77 = r50.mul_add(r77, r23);
-            let r71 = lit(0.5) * r71;
-            let r77 = r77.sqrt();
-            let r71 = r71 / r77;
-            let r65 = r69 * r69;
-            let r67 = lit(1.0) - r65;
-            let r67 = r24 * r67;
-            let r65 = r50.mul_add(r65, r23);
-            let r67 = lit(0.5) * r67;
-            let r65 = r65.sqrt();
-            let r67 = r67 / r65;
-            let r67 = r76 * r67;
-            let r67 = r69.mul_add(r71, r67);
-            let r65 = r76 * r65;
-            let r65 = r69.mul_add(r77, r65);
-            let r67 = select(lit(1e-6).lt(r65), r67, lit(0.0));
-            let r65 = lit(1e-6).max(r65);
-            let r65 = unary(Unary::Reciprocal, r65);
-            let r77 = lit(0.5) * r65;
-            let r67 = r77 * r67;
-            let r53 = r77 * r53;
-            let r65 = r67 * r65;
-            let r53 = (-r12).mul_add(r65, r53);
-            let r53 = r66 * r53;
-            let r77 = r12 * r77;
-            let r53 = select(r73.ge(lit(0.5)), r53, lit(0.0));
-            let r75 = r77 * r75;
-            let r53 = r35 * r53;
-            let r75 = select(r73.ge(lit(0.5)), r75, lit(0.0));
-            let r77 = r66 * r77;
-            let r75 = r35 * r75;
-            let r77 = select(r73.ge(lit(0.5)), r77, lit(0.0));
-            let r77 = r35 * r77;
-            let r73 = r1 * u(168);
-            let r73 = r3.mul_add(u(169), r73);
-            let r73 = r5.mul_add(u(170), r73);
-            let r10 = select(lit(0.0).lt(r73), r10, lit(0.0));
-            let r66 = r0 * r0;
-            let r66 = r2.mul_add(r2, r66);
-            let r66 = r6.mul_add(r6, r66);
-            let r12 = binary(Binary::Less, lit(1e-12), r66);
-            let r12 = select(r10.ge(lit(0.5)), r12, lit(0.0));
-            let r66 = select(r12.ge(lit(0.5)), r66, lit(1.0));
-            let r73 = select(r12.ge(lit(0.5)), r73, lit(1.0));
-            let r4 = select(r12.ge(lit(0.5)), r4, lit(1.0));
-            let r10 = r66.sqrt();
-            let r10 = lit(0.5) * r10;
-            let r66 = unary(Unary::Reciprocal, r66);
-            let r10 = select(r12.ge(lit(0.5)), r10, lit(1.0));
-            let r65 = r10.mul_add(r10, r60);
-            let r65 = r65.sqrt();
-            let r62 = r62 / r65;
-            let r65 = r10 + r65;
-            let r62 = select(lit(0.1).lt(r65), r62, lit(0.0));
-            let r65 = lit(0.1).max(r65);
-            let r67 = r61 * r62;
-            let r67 = (-r65).mul_add(r59, r67);
-            let r61 = r61 * r65;
-            let r67 = r61 * r67;
-            let r67 = lit(2.0) * r67;
-            let r61 = r61 * r61;
-            let r67 = r61 * r67;
-            let r67 = lit(2.0) * r67;
-            let r61 = r61 * r61;
-            let r61 = unary(Unary::Reciprocal, r61);
-            let r58 = r58 * r61;
-            let r57 = (-r58).mul_add(r67, r57);
-            let r61 = r57 * r61;
-            let r57 = r10 * r65;
-            let r57 = r57 - lit(1.0);
-            let r65 = unary(Unary::Reciprocal, r65);
-            let r60 = r60 * r65;
-            let r64 = (-r60).mul_add(r62, r64);
-            let r65 = r64 * r65;
-            let r60 = r10.mul_add(r60, lit(1.0));
-            let r60 = unary(Unary::Reciprocal, r60);
-            let r57 = r57 * r60;
-            let r62 = (-r57).mul_add(r65, r62);
-            let r62 = r10 * r62;
-            let r60 = r62 * r60;
-            let r60 = r57 * r60;
-            let r60 = lit(2.0) * r60;
-            let r57 = r57.mul_add(r57, lit(1.0));
-            let r61 = r57 * r61;
-            let r61 = r58.mul_add(r60, r61);
-            let r61 = select(r55.lt(lit(1.0)), r61, lit(0.0));
-            let r57 = r58 * r57;
-            let r57 = select(r55.lt(lit(1.0)), r57, lit(1.0));
-            let r55 = r1 * r0;
-            let r55 = r3.mul_add(r2, r55);
-            let r55 = r5.mul_add(r6, r55);
-            let r55 = r55 * r55;
-            let r58 = r1 * r2;
-            let r58 = (-r3).mul_add(r0, r58);
-            let r0 = r5 * r0;
-            let r0 = (-r1).mul_add(r6, r0);
-            let r6 = r3 * r6;
-            let r6 = (-r5).mul_add(r2, r6);
-            let r6 = r6 * r6;
-            let r6 = r0.mul_add(r0, r6);
-            let r6 = r58.mul_add(r58, r6);
-            let r6 = r23.mul_add(r55, r6);
-            let r55 = r55 * r24;
-            let r55 = r55 * r66;
-            let r55 = select(r12.ge(lit(0.5)), r55, lit(0.0));
-            let r66 = r6 * r66;
-            let r66 = select(r12.ge(lit(0.5)), r66, lit(1.0));
-            let r55 = r66 * r55;
-            let r55 = lit(6.283185307179586) * r55;
-            let r6 = lit(3.141592653589793) * r66;
-            let r6 = r66 * r6;
-            let r6 = unary(Unary::Reciprocal, r6);
-            let r66 = r23 * r6;
-            let r55 = (-r66).mul_add(r55, r24);
-            let r6 = r55 * r6;
-            let r55 = r4 * r4;
-            let r58 = lit(1.0) - r55;
-            let r58 = r24 * r58;
-            let r55 = r50.mul_add(r55, r23);
-            let r58 = lit(0.5) * r58;
-            let r55 = r55.sqrt();
-            let r58 = r58 / r55;
-            let r0 = r73 * r73;
-            let r2 = lit(1.0) - r0;
-            let r2 = r24 * r2;
-            let r23 = r50.mul_add(r0, r23);
-            let r2 = lit(0.5) * r2;
-            let r23 = r23.sqrt();
-            let r2 = r2 / r23;
-            let r2 = r4 * r2;
-            let r2 = r73.mul_add(r58, r2);
-            let r23 = r4 * r23;
-            let r23 = r73.mul_add(r55, r23);
-            let r2 = select(lit(1e-6).lt(r23), r2, lit(0.0));
-            let r23 = lit(1e-6).max(r23);
-            let r23 = unary(Unary::Reciprocal, r23);
-            let r55 = lit(0.5) * r23;
-            let r2 = r55 * r2;
-            let r6 = r55 * r6;
-            let r23 = r2 * r23;
-            let r6 = (-r66).mul_add(r23, r6);
-            let r6 = r57 * r6;
-            let r55 = r66 * r55;
-            let r6 = select(r12.ge(lit(0.5)), r6, lit(0.0));
-            let r61 = r55 * r61;
-            let r6 = r39 * r6;
-            let r61 = select(r12.ge(lit(0.5)), r61, lit(0.0));
-            let r55 = r57 * r55;
-            let r61 = r39 * r61;
-            let r55 = select(r12.ge(lit(0.5)), r55, lit(0.0));
-            let r55 = r39 * r55;
-            let r12 = u(171) * r6;
-            let r12 = u(172).mul_add(r53, r12);
-            let r12 = u(173).mul_add(r63, r12);
-            let r12 = u(174).mul_add(r11, r12);
-            let r12 = r42.mul_add(r13, r12);
-            let r54 = r17.mul_add(r12, r54);
-            put(15, i, r54);
-            let r19 = r12.mul_add(r18, r19);
-            put(18, i, r19);
-            let r12 = r6 * u(175);
-            let r12 = r53.mul_add(u(176), r12);
-            let r6 = r6 * u(177);
-            let r12 = r63.mul_add(u(178), r12);
-            let r6 = r53.mul_add(u(179), r6);
-            let r12 = r11.mul_add(u(180), r12);
-            let r6 = r63.mul_add(u(181), r6);
-            let r6 = r11.mul_add(u(182), r6);
-            let r11 = u(171) * r61;
-            let r11 = u(172).mul_add(r75, r11);
-            let r11 = u(173).mul_add(r72, r11);
-            let r11 = u(174).mul_add(r68, r11);
-            let r11 = u(132).mul_add(r14, r11);
-            let r11 = r34.mul_add(r45, r11);
-            put(21, i, r11);
-            let r45 = u(175) * r61;
-            let r45 = u(176).mul_add(r75, r45);
-            let r61 = u(177) * r61;
-            let r45 = u(178).mul_add(r72, r45);
-            let r61 = u(179).mul_add(r75, r61);
-            let r45 = u(180).mul_add(r68, r45);
-            let r61 = u(181).mul_add(r72, r61);
-            let r61 = u(182).mul_add(r68, r61);
-            let r68 = r55 * u(183);
-            let r68 = r77.mul_add(u(184), r68);
-            let r68 = r74.mul_add(u(185), r68);
-            let r68 = r70.mul_add(u(186), r68);
-            let r68 = r49 + r68;
-            let r68 = r31.mul_add(r42, r68);
-            put(12, i, r68);
-            let r42 = r55 * u(187);
-            let r42 = r77.mul_add(u(188), r42);
-            let r42 = r74.mul_add(u(189), r42);
-            let r42 = r70.mul_add(u(190), r42);
-            let r31 = r55 * u(191);
-            let r31 = r77.mul_add(u(192), r31);
-            let r31 = r74.mul_add(u(193), r31);
-            let r31 = r70.mul_add(u(194), r31);
-            let r72 = u(195) * r55;
-            let r72 = u(196).mul_add(r77, r72);
-            let r72 = u(197).mul_add(r74, r72);
-            let r72 = u(198).mul_add(r70, r72);
-            let r72 = u(132).mul_add(r49, r72);
-            let r72 = r37.mul_add(r47, r72);
-            put(0, i, r72);
-            let r47 = r36 * u(199);
-            let r37 = lit(1.0).min(r47);
-            let r37 = (-u(133)).mul_add(r37, lit(1.0));
-            let r49 = select(r47.lt(lit(1.0)), r36, lit(0.0));
-            let r47 = select(r47.lt(lit(1.0)), u(199), lit(0.0));
-            let r75 = r21.mul_add(u(200), u(201));
-            let r49 = r75 * r49;
-            let r34 = r75 * r28;
-            let r34 = r47 * r34;
-            let r14 = r30 * r75;
-            let r14 = r47 * r14;
-            let r75 = r37 * r75;
-            let r47 = r39 * u(202);
-            let r47 = r35.mul_add(u(203), r47);
-            let r47 = r40.mul_add(u(204), r47);
-            let r63 = kept(10);
-            let r53 = u(133) * r63;
-            let r53 = -r53;
-            let r53 = (-r43).mul_add(u(205), r53);
-            let r53 = (-r40).mul_add(u(206), r53);
-            let r53 = (-r35).mul_add(u(207), r53);
-            let r53 = (-r39).mul_add(u(208), r53);
-            let r13 = samples(17);
-            let r57 = r13 * r53;
-            let r12 = r57.mul_add(r34, r12);
-            let r34 = r33 * r13;
-            let r34 = r53 * r34;
-            let r53 = r43 * u(209);
-            let r66 = r47 + r53;
-            let r66 = r66 + r63;
-            let r47 = r47 + r63;
-            let r66 = r13 * r66;
-            let r47 = r53 + r47;
-            let r47 = r13 * r47;
-            let r53 = r48 * r52;
-            let r53 = r51.mul_add(r15, r53);
-            let r52 = r29 * r52;
-            let r52 = r51.mul_add(r16, r52);
-            let r16 = samples(19);
-            let r53 = r16.mul_add(r22, r53);
-            let r53 = u(199) * r53;
-            let r53 = r17.mul_add(r12, r53);
-            put(16, i, r53);
-            let r51 = r48 * r25;
-            let r51 = u(152).mul_add(r9, r51);
-            let r48 = r46 * r48;
-            let r25 = r29 * r25;
-            let r51 = r16.mul_add(r27, r51);
-            let r25 = u(152).mul_add(r8, r25);
-            let r29 = r46 * r29;
-            let r51 = u(199) * r51;
-            let r48 = r26.mul_add(r16, r48);
-            let r51 = r12.mul_add(r18, r51);
-            put(19, i, r51);
-            let r12 = r30 * r48;
-            let r12 = r33 * r12;
-            let r48 = r36 * r48;
-            let r45 = u(199).mul_add(r12, r45);
-            let r42 = r48 + r42;
-            let r45 = r14.mul_add(r34, r45);
-            put(22, i, r45);
-            let r42 = r49.mul_add(r57, r42);
-            put(13, i, r42);
-            let r57 = r55 * u(210);
-            let r57 = r77.mul_add(u(211), r57);
-            let r55 = r55 * u(212);
-            let r57 = r74.mul_add(u(213), r57);
-            let r55 = r77.mul_add(u(214), r55);
-            let r57 = r70.mul_add(u(215), r57);
-            let r55 = r74.mul_add(u(216), r55);
-            let r57 = u(199).mul_add(r48, r57);
-            let r55 = r70.mul_add(u(217), r55);
-            let r57 = r75.mul_add(r66, r57);
-            put(1, i, r57);
-            let r66 = r36 * u(218);
-            let r75 = lit(1.0).min(r66);
-            let r75 = (-u(133)).mul_add(r75, lit(1.0));
-            let r70 = select(r66.lt(lit(1.0)), r36, lit(0.0));
-            let r66 = select(r66.lt(lit(1.0)), u(218), lit(0.0));
-            let r48 = r21.mul_add(u(219), u(220));
-            let r70 = r48 * r70;
-            let r28 = r48 * r28;
-            let r28 = r66 * r28;
-            let r74 = r30 * r48;
-            let r74 = r66 * r74;
-            let r48 = r75 * r48;
-            let r66 = r39 * u(221);
-            let r66 = r35.mul_add(u(222), r66);
-            let r66 = r40.mul_add(u(223), r66);
-            let r77 = kept(11);
-            let r49 = u(133) * r77;
-            let r49 = -r49;
-            let r49 = (-r43).mul_add(u(224), r49);
-            let r49 = (-r40).mul_add(u(225), r49);
-            let r49 = (-r35).mul_add(u(226), r49);
-            let r49 = (-r39).mul_add(u(227), r49);
-            let r34 = samples(20);
-            let r14 = r34 * r49;
-            let r6 = r14.mul_add(r28, r6);
-            let r28 = r33 * r34;
-            let r28 = r49 * r28;
-            let r49 = r43 * u(228);
-            let r12 = r66 + r49;
-            let r12 = r12 + r77;
-            let r66 = r66 + r77;
-            let r12 = r34 * r12;
-            let r66 = r49 + r66;
-            let r66 = r34 * r66;
-            let r49 = samples(22);
-            let r52 = r49.mul_add(r22, r52);
-            let r25 = r49.mul_add(r27, r25);
-            let r52 = u(218) * r52;
-            let r25 = u(218) * r25;
-            let r29 = r26.mul_add(r49, r29);
-            let r52 = r17.mul_add(r6, r52);
-            put(17, i, r52);
-            let r30 = r30 * r29;
-            let r25 = r6.mul_add(r18, r25);
-            put(20, i, r25);
-            let r30 = r33 * r30;
-            let r29 = r36 * r29;
-            let r61 = u(218).mul_add(r30, r61);
-            let r31 = r29 + r31;
-            let r61 = r74.mul_add(r28, r61);
-            put(23, i, r61);
-            let r31 = r70.mul_add(r14, r31);
-            put(14, i, r31);
-            let r55 = u(218).mul_add(r29, r55);
-            let r55 = r48.mul_add(r12, r55);
-            put(2, i, r55);
-            let r12 = r38 * r32;
-            put(3, i, r12);
-            let r48 = r37 * r47;
-            put(4, i, r48);
-            let r29 = r75 * r66;
-            put(5, i, r29);
-            let r14 = r38 * r21;
-            let r14 = r32 * r14;
-            put(6, i, r14);
-            let r38 = r38 * r20;
-            let r32 = r21 * r37;
-            let r32 = r47 * r32;
-            put(7, i, r32);
-            let r21 = r21 * r75;
-            let r37 = r37 * r20;
-            let r21 = r66 * r21;
-            put(8, i, r21);
-            let r20 = r75 * r20;
-            let r75 = r39 * u(229);
-            let r75 = r35.mul_add(u(230), r75);
-            let r75 = r40.mul_add(u(231), r75);
-            let r75 = u(134).mul_add(r41, r75);
-            let r75 = r43.mul_add(u(232), r75);
-            let r38 = r75 * r38;
-            let r38 = r44 * r38;
-            put(9, i, r38);
-            let r44 = r39 * u(233);
-            let r44 = r35.mul_add(u(234), r44);
-            let r39 = r39 * u(235);
-            let r44 = r40.mul_add(u(236), r44);
-            let r39 = r35.mul_add(u(237), r39);
-            let r44 = u(200).mul_add(r63, r44);
-            let r39 = r40.mul_add(u(238), r39);
-            let r44 = r43.mul_add(u(239), r44);
-            let r39 = u(219).mul_add(r77, r39);
-            let r37 = r44 * r37;
-            let r39 = r43.mul_add(u(240), r39);
-            let r37 = r13 * r37;
-            put(10, i, r37);
-            let r20 = r39 * r20;
-            let r20 = r34 * r20;
-            put(11, i, r20);
+            let r19 = lit(8.0) * r19;
+            let r39 = r39 * lit(8.0);
+            let r40 = r63 / r40;
+            let r63 = r41 * r40;
+            let r63 = r63 * lit(-2.0);
+            let r8 = lit(4.0) * r40;
+            let r8 = (-r43).mul_add(r63, r8);
+            let r42 = r8 * r42;
+            let r8 = binary(Binary::Less, lit(0.0), r4);
+            let r63 = lit(1.0) - r22;
+            let r53 = lit(0.5) * r42;
+            let mut made = [[lit(0.0); 4]; 4];
+            for m in 0..4 {
+                let r7 = kept([3, 4, 5, 6][m]);
+                let r25 = r1 * own(m, 0);
+                let r25 = r3.mul_add(own(m, 1), r25);
+                let r25 = r5.mul_add(own(m, 2), r25);
+                let r9 = select(lit(0.0).lt(r25), r8, lit(0.0));
+                let r16 = own(m, 2) - r6;
+                let r49 = own(m, 1) - r2;
+                let r15 = own(m, 0) - r0;
+                let r14 = r15 * r15;
+                let r14 = r49.mul_add(r49, r14);
+                let r14 = r16.mul_add(r16, r14);
+                let r48 = binary(Binary::Less, lit(1e-12), r14);
+                let r48 = select(r9.ge(lit(0.5)), r48, lit(0.0));
+                let r14 = select(r48.ge(lit(0.5)), r14, lit(1.0));
+                let r9 = r14.sqrt();
+                let r9 = lit(0.5) * r9;
+                let r9 = select(r48.ge(lit(0.5)), r9, lit(1.0));
+                let r65 = r9.mul_add(r9, r43);
+                let r65 = r65.sqrt();
+                let r66 = r9 + r65;
+                let r67 = r66.max(lit(0.1));
+                let r68 = r41 * r67;
+                let r69 = r68 * r68;
+                let r70 = r69 * r69;
+                let r70 = unary(Unary::Reciprocal, r70);
+                let r71 = r39 * r70;
+                let r72 = r9.mul_add(r67, lit(-1.0));
+                let r73 = unary(Unary::Reciprocal, r67);
+                let r74 = r43 * r73;
+                let r75 = r9.mul_add(r74, lit(1.0));
+                let r75 = unary(Unary::Reciprocal, r75);
+                let r72 = r72 * r75;
+                let r76 = r72.mul_add(r72, lit(1.0));
+                let r77 = r71 * r76;
+                let r77 = select(r30.lt(lit(1.0)), r77, lit(1.0));
+                let r78 = r1 * r49;
+                let r78 = (-r3).mul_add(r15, r78);
+                let r79 = r5 * r15;
+                let r79 = (-r1).mul_add(r16, r79);
+                let r15 = r1 * r15;
+                let r15 = r3.mul_add(r49, r15);
+                let r15 = r5.mul_add(r16, r15);
+                let r15 = r15 * r15;
+                let r16 = r3 * r16;
+                let r16 = (-r5).mul_add(r49, r16);
+                let r16 = r16 * r16;
+                let r16 = r22.mul_add(r15, r16);
+                let r16 = r79.mul_add(r79, r16);
+                let r16 = r78.mul_add(r78, r16);
+                let r14 = unary(Unary::Reciprocal, r14);
+                let r16 = r16 * r14;
+                let r16 = select(r48.ge(lit(0.5)), r16, lit(1.0));
+                let r78 = lit(3.141592653589793) * r16;
+                let r78 = r16 * r78;
+                let r78 = unary(Unary::Reciprocal, r78);
+                let r79 = r22 * r78;
+                let r25 = select(r48.ge(lit(0.5)), r25, lit(1.0));
+                let r49 = select(r48.ge(lit(0.5)), r4, lit(1.0));
+                let r80 = r49 * r49;
+                let r81 = r63.mul_add(r80, r22);
+                let r81 = r81.sqrt();
+                let r82 = r25 * r25;
+                let r83 = r63.mul_add(r82, r22);
+                let r83 = r83.sqrt();
+                let r84 = r49 * r83;
+                let r84 = r25.mul_add(r81, r84);
+                let r85 = lit(1e-6).max(r84);
+                let r85 = unary(Unary::Reciprocal, r85);
+                let r86 = lit(0.5) * r85;
+                let r87 = r79 * r86;
+                let r88 = r77 * r87;
+                let r88 = select(r48.ge(lit(0.5)), r88, lit(0.0));
+                let r88 = r7 * r88;
+                let r80 = lit(1.0) - r80;
+                let r80 = r13 * r80;
+                let r80 = lit(0.5) * r80;
+                let r81 = r80 / r81;
+                let r82 = lit(1.0) - r82;
+                let r82 = r13 * r82;
+                let r82 = lit(0.5) * r82;
+                let r83 = r82 / r83;
+                let r83 = r49 * r83;
+                let r83 = r25.mul_add(r81, r83);
+                let r83 = select(lit(1e-6).lt(r84), r83, lit(0.0));
+                let r83 = r86 * r83;
+                let r85 = r83 * r85;
+                let r15 = r15 * r13;
+                let r14 = r15 * r14;
+                let r14 = select(r48.ge(lit(0.5)), r14, lit(0.0));
+                let r14 = r16 * r14;
+                let r14 = lit(6.283185307179586) * r14;
+                let r14 = (-r79).mul_add(r14, r13);
+                let r78 = r14 * r78;
+                let r78 = r86 * r78;
+                let r78 = (-r79).mul_add(r85, r78);
+                let r78 = r77 * r78;
+                let r78 = select(r48.ge(lit(0.5)), r78, lit(0.0));
+                let r78 = r7 * r78;
+                let r65 = r53 / r65;
+                let r65 = select(lit(0.1).lt(r66), r65, lit(0.0));
+                let r74 = (-r74).mul_add(r65, r42);
+                let r73 = r74 * r73;
+                let r73 = (-r72).mul_add(r73, r65);
+                let r73 = r9 * r73;
+                let r75 = r73 * r75;
+                let r75 = r72 * r75;
+                let r75 = lit(2.0) * r75;
+                let r65 = r41 * r65;
+                let r65 = (-r67).mul_add(r40, r65);
+                let r65 = r68 * r65;
+                let r65 = lit(2.0) * r65;
+                let r65 = r69 * r65;
+                let r65 = lit(2.0) * r65;
+                let r65 = (-r71).mul_add(r65, r19);
+                let r70 = r65 * r70;
+                let r70 = r76 * r70;
+                let r70 = r71.mul_add(r75, r70);
+                let r70 = select(r30.lt(lit(1.0)), r70, lit(0.0));
+                let r70 = r87 * r70;
+                let r70 = select(r48.ge(lit(0.5)), r70, lit(0.0));
+                let r70 = r7 * r70;
+                made[m] = [r7, r88, r78, r70];
+            }
+            let [r7, r88, r78, r70] = made[0];
+            let [r48, r92, r83, r66] = made[1];
+            let [r68, r96, r82, r72] = made[2];
+            let [r9, r77, r93, r89] = made[3];
+            let r33 = (-r7).mul_add(u(170), r33);
+            let r52 = (-r7).mul_add(u(171), r52);
+            let r62 = (-r7).mul_add(u(172), r62);
+            let r46 = u(173).mul_add(r70, r46);
+            let r55 = u(174).mul_add(r70, r55);
+            let r33 = (-r48).mul_add(u(175), r33);
+            let r52 = (-r48).mul_add(u(176), r52);
+            let r62 = (-r48).mul_add(u(177), r62);
+            let r46 = u(178).mul_add(r66, r46);
+            let r55 = u(179).mul_add(r66, r55);
+            let r38 = u(180).mul_add(r70, r38);
+            let r33 = (-r68).mul_add(u(181), r33);
+            let r52 = (-r68).mul_add(u(182), r52);
+            let r62 = (-r68).mul_add(u(183), r62);
+            let r46 = u(184).mul_add(r72, r46);
+            let r55 = u(185).mul_add(r72, r55);
+            let r38 = u(186).mul_add(r66, r38);
+            let r33 = (-r9).mul_add(u(187), r33);
+            let r52 = (-r9).mul_add(u(188), r52);
+            let r62 = (-r9).mul_add(u(189), r62);
+            let r46 = u(190).mul_add(r89, r46);
+            let r55 = u(191).mul_add(r89, r55);
+            let r38 = u(192).mul_add(r72, r38);
+            let r38 = u(193).mul_add(r89, r38);
+            let r89 = r88.mul_add(u(194), r45);
+            let r89 = r92.mul_add(u(195), r89);
+            let r45 = u(144) * r45;
+            let r89 = r96.mul_add(u(196), r89);
+            let r45 = u(173).mul_add(r88, r45);
+            let r89 = r77.mul_add(u(197), r89);
+            let r45 = u(178).mul_add(r92, r45);
+            let r45 = u(184).mul_add(r96, r45);
+            let r45 = u(190).mul_add(r77, r45);
+            let r72 = samples(8);
+            let r66 = r72 * r33;
+            let r89 = r36.mul_add(r66, r89);
+            put(12, i, r89);
+            let r36 = r88.mul_add(u(198), r54);
+            let r36 = r92.mul_add(u(199), r36);
+            let r54 = u(157) * r54;
+            let r36 = r96.mul_add(u(200), r36);
+            let r54 = r88.mul_add(u(174), r54);
+            let r36 = r77.mul_add(u(201), r36);
+            let r54 = r92.mul_add(u(179), r54);
+            let r54 = r96.mul_add(u(185), r54);
+            let r54 = r77.mul_add(u(191), r54);
+            let r70 = samples(17);
+            let r15 = r70 * r52;
+            let r36 = r10.mul_add(r15, r36);
+            put(13, i, r36);
+            let r10 = r88.mul_add(u(202), r64);
+            let r10 = r92.mul_add(u(203), r10);
+            let r64 = u(160) * r64;
+            let r10 = r96.mul_add(u(204), r10);
+            let r64 = r88.mul_add(u(180), r64);
+            let r10 = r77.mul_add(u(205), r10);
+            let r64 = r92.mul_add(u(186), r64);
+            let r64 = r96.mul_add(u(192), r64);
+            let r64 = r77.mul_add(u(193), r64);
+            let r77 = samples(20);
+            let r96 = r77 * r62;
+            let r10 = r58.mul_add(r96, r10);
+            put(14, i, r10);
+            let r58 = u(173) * r78;
+            let r58 = u(178).mul_add(r83, r58);
+            let r58 = u(184).mul_add(r82, r58);
+            let r58 = u(190).mul_add(r93, r58);
+            let r58 = r66.mul_add(r29, r58);
+            let r44 = r17.mul_add(r58, r44);
+            put(15, i, r44);
+            let r23 = r58.mul_add(r18, r23);
+            put(18, i, r23);
+            let r58 = u(174) * r78;
+            let r58 = u(179).mul_add(r83, r58);
+            let r78 = u(180) * r78;
+            let r58 = u(185).mul_add(r82, r58);
+            let r78 = u(186).mul_add(r83, r78);
+            let r58 = u(191).mul_add(r93, r58);
+            let r78 = u(192).mul_add(r82, r78);
+            let r58 = r15.mul_add(r50, r58);
+            let r78 = u(193).mul_add(r93, r78);
+            let r27 = r17.mul_add(r58, r27);
+            put(16, i, r27);
+            let r78 = r96.mul_add(r60, r78);
+            let r26 = r17.mul_add(r78, r26);
+            put(17, i, r26);
+            let r24 = r58.mul_add(r18, r24);
+            put(19, i, r24);
+            let r34 = r78.mul_add(r18, r34);
+            put(20, i, r34);
+            let r18 = r31 * r72;
+            let r18 = r33 * r18;
+            let r46 = r35.mul_add(r18, r46);
+            put(21, i, r46);
+            let r18 = r31 * r70;
+            let r18 = r52 * r18;
+            let r31 = r31 * r77;
+            let r55 = r51.mul_add(r18, r55);
+            put(22, i, r55);
+            let r31 = r62 * r31;
+            let r38 = r61.mul_add(r31, r38);
+            put(23, i, r38);
+            let r31 = r7.mul_add(u(206), r37);
+            let r31 = r48.mul_add(u(207), r31);
+            let r37 = u(146) * r37;
+            let r31 = r68.mul_add(u(208), r31);
+            let r37 = r7.mul_add(u(209), r37);
+            let r31 = r9.mul_add(u(210), r31);
+            let r37 = r48.mul_add(u(211), r37);
+            let r31 = r72 * r31;
+            let r37 = r68.mul_add(u(212), r37);
+            let r45 = r28.mul_add(r31, r45);
+            put(0, i, r45);
+            let r37 = r9.mul_add(u(213), r37);
+            let r28 = r7.mul_add(u(214), r12);
+            let r28 = r48.mul_add(u(215), r28);
+            let r12 = u(158) * r12;
+            let r28 = r68.mul_add(u(216), r28);
+            let r12 = r7.mul_add(u(217), r12);
+            let r28 = r9.mul_add(u(218), r28);
+            let r12 = r48.mul_add(u(219), r12);
+            let r28 = r70 * r28;
+            let r12 = r68.mul_add(u(220), r12);
+            let r54 = r47.mul_add(r28, r54);
+            put(1, i, r54);
+            let r12 = r9.mul_add(u(221), r12);
+            let r47 = r7.mul_add(u(222), r56);
+            let r47 = r48.mul_add(u(223), r47);
+            let r56 = u(161) * r56;
+            let r47 = r68.mul_add(u(224), r47);
+            let r56 = r7.mul_add(u(225), r56);
+            let r47 = r9.mul_add(u(226), r47);
+            let r56 = r48.mul_add(u(227), r56);
+            let r47 = r77 * r47;
+            let r56 = r68.mul_add(u(228), r56);
+            let r64 = r59.mul_add(r47, r64);
+            put(2, i, r64);
+            let r56 = r9.mul_add(u(229), r56);
+            let r9 = r57 * r47;
+            put(5, i, r9);
+            let r59 = r21 * r57;
+            let r59 = r47 * r59;
+            put(8, i, r59);
+            let r57 = r57 * r20;
+            let r57 = r56 * r57;
+            let r57 = r77 * r57;
+            put(11, i, r57);
+            let r77 = r32 * r31;
+            put(3, i, r77);
+            let r56 = r11 * r28;
+            put(4, i, r56);
+            let r47 = r32 * r21;
+            let r47 = r31 * r47;
+            put(6, i, r47);
+            let r21 = r21 * r11;
+            let r32 = r32 * r20;
+            let r21 = r28 * r21;
+            put(7, i, r21);
+            let r32 = r37 * r32;
+            let r20 = r11 * r20;
+            let r32 = r72 * r32;
+            put(9, i, r32);
+            let r20 = r12 * r20;
+            let r20 = r70 * r20;
+            put(10, i, r20);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn lit_strength_keep<S: Simd>(simd: S, block: Block<'_>) {
+fn lit_strength_keep<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let lit = |x: f64| R::splat(simd, x as f32);
         let numbers: &[f32; 3] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let u = |k: usize| R::splat(simd, numbers[k]);
         let fields = block.fields::<28>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<4>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
             let r0 = samples(15);
             let r0 = lit(1.0) - r0;
             let r0 = (-u(1)).mul_add(r0, lit(1.0));
@@ -9654,37 +9190,41 @@ fn lit_strength_keep<S: Simd>(simd: S, block: Block<'_>) {
             let r3 = lit(1.0).min(r3);
             let r3 = r3.sqrt();
             put(3, i, r3);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn lit_strength_value<S: Simd>(simd: S, block: Block<'_>) {
+fn lit_strength_value<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
-        let numbers: &[f32; 188] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let lit = |x: f64| R::splat(simd, x as f32);
+        let numbers: &[f32; 189] = block.uniforms();
+        let u = |k: usize| R::splat(simd, numbers[k]);
+        let of_members = numbers.as_chunks::<3>().0;
+        let own = |m: usize, k: usize| R::splat(simd, of_members[m][k]);
         let fields = block.fields::<28>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<3>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<4>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = samples(3);
             let r1 = samples(2);
-            let r0 = r0.mul_add(u(0), r1);
+            let r0 = r0.mul_add(u(12), r1);
             let r2 = samples(5);
             let r3 = samples(4);
-            let r2 = u(0).mul_add(r2, r3);
+            let r2 = u(12).mul_add(r2, r3);
             let r4 = samples(7);
             let r5 = samples(6);
-            let r4 = u(0).mul_add(r4, r5);
+            let r4 = u(12).mul_add(r4, r5);
             let r6 = samples(8);
             let r7 = samples(9);
             let r8 = samples(1);
@@ -9737,18 +9277,18 @@ fn lit_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r3 = samples(11);
             let r13 = select(r3.ge(lit(1.2e-38)), r3, lit(1.0));
             let r13 = r13.log2();
-            let r13 = u(6) * r13;
+            let r13 = u(18) * r13;
             let r13 = r13.exp2();
             let r15 = samples(10);
-            let r19 = (-r15).mul_add(u(7), lit(1.0));
-            let r19 = u(8) * r19;
+            let r19 = (-r15).mul_add(u(19), lit(1.0));
+            let r19 = u(20) * r19;
             let r19 = r19.max(lit(0.05));
             let r20 = r19 * r19;
             let r21 = r20 * lit(-3.321928);
             let r21 = r20 * r21;
             let r21 = r21.exp2();
             let r22 = samples(0);
-            let r23 = r15.mul_add(u(11), u(12));
+            let r23 = r15.mul_add(u(23), u(24));
             let r12 = -r12;
             let r24 = lit(0.0).max(r12);
             let r24 = lit(1e-6).max(r24);
@@ -9887,496 +9427,294 @@ fn lit_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r25 = r23 * r25;
             let r28 = r26 * r28;
             let r28 = r24 * r28;
-            let r28 = u(126).mul_add(r25, r28);
-            let r25 = r28 * u(127);
+            let r28 = u(138).mul_add(r25, r28);
+            let r25 = r28 * u(139);
             let r25 = lit(1.0).min(r25);
-            let r25 = (-r25).mul_add(u(128), lit(1.0));
-            let r13 = select(r3.ge(lit(1.2e-38)), r13, u(129));
-            let r3 = r13.mul_add(u(130), u(131));
+            let r25 = (-r25).mul_add(u(140), lit(1.0));
+            let r13 = select(r3.ge(lit(1.2e-38)), r13, u(141));
+            let r3 = r13.mul_add(u(142), u(143));
             let r3 = r25 * r3;
             let r25 = kept(0);
             let texels205 = cubes[0].footprint_at(r0, r2, r4);
-            let texels297 = cubes[2].footprint_at(r16, r17, r18);
-            let texels298 = texels297;
+            let texels280 = cubes[2].footprint_at(r16, r17, r18);
+            let texels281 = texels280;
             let cube = cubes[0];
             let at = texels205;
             let [r24, r26, r27, _] = cube.sample_at(&at);
-            let r4 = samples(15);
-            let r2 = r9 * u(132);
-            let r2 = r10.mul_add(u(133), r2);
-            let r2 = r11.mul_add(u(134), r2);
-            let r0 = lit(0.0).max(r2);
-            let r19 = r4 * r0;
-            let r29 = samples(14);
-            let r30 = r9 * u(135);
-            let r30 = r10.mul_add(u(136), r30);
-            let r30 = r11.mul_add(u(137), r30);
-            let r31 = lit(0.0).max(r30);
-            let r32 = r29 * r31;
-            let r33 = samples(13);
-            let r34 = r9 * u(138);
-            let r34 = r10.mul_add(u(139), r34);
-            let r34 = r11.mul_add(u(140), r34);
-            let r35 = lit(0.0).max(r34);
-            let r36 = r33 * r35;
-            let r37 = samples(12);
-            let r38 = r9 * u(141);
-            let r38 = r10.mul_add(u(142), r38);
-            let r38 = r11.mul_add(u(143), r38);
-            let r39 = lit(0.0).max(r38);
-            let r40 = r37 * r39;
-            let r41 = r40 * u(144);
-            let r41 = r36.mul_add(u(145), r41);
-            let r41 = r32.mul_add(u(146), r41);
-            let r41 = r19.mul_add(u(147), r41);
-            let r41 = r25.mul_add(r24, r41);
-            let r41 = r3 * r41;
-            let r3 = samples(21);
-            let r24 = samples(17);
-            let r25 = samples(18);
-            let r42 = samples(19);
-            let unit = Unit::new([r24, r25, r42]);
-            let [mut r43, mut r44, mut r45] = unit.direction;
-            let r46 = unit.has_direction;
+            let r24 = r25 * r24;
+            let r25 = binary(Binary::Less, lit(0.0), r12);
+            let r23 = u(138) * r23;
+            let r4 = select(r23.lt(lit(1.0)), r23, lit(0.0));
+            let r2 = r4 * lit(8.0);
+            let r4 = r4.max(lit(1e-24));
+            let r4 = r4.sqrt();
+            let r0 = lit(1.0) - r4;
+            let r4 = r4 * lit(4.0);
+            let r19 = r0 * r0;
+            let r19 = r4 / r19;
+            let r20 = r20 * r20;
+            let r4 = lit(1.0) - r20;
+            let r29 = samples(21);
+            let r30 = samples(17);
+            let r31 = samples(18);
+            let r32 = samples(19);
+            let unit = Unit::new([r30, r31, r32]);
+            let [mut r33, mut r34, mut r35] = unit.direction;
+            let r36 = unit.has_direction;
             if !unit.all {
-                r43 = select(r46, r43, r9);
-                r44 = select(r46, r44, r10);
-                r45 = select(r46, r45, r11);
+                r33 = select(r36, r33, r9);
+                r34 = select(r36, r34, r10);
+                r35 = select(r36, r35, r11);
             }
             let unit = Unit::new([r5, r14, r1]);
-            let [mut r46, mut r42, mut r25] = unit.direction;
-            let r24 = unit.has_direction;
+            let [mut r36, mut r32, mut r31] = unit.direction;
+            let r30 = unit.has_direction;
             if !unit.all {
-                r46 = select(r24, r46, r9);
-                r42 = select(r24, r42, r10);
-                r25 = select(r24, r25, r11);
+                r36 = select(r30, r36, r9);
+                r32 = select(r30, r32, r10);
+                r31 = select(r30, r31, r11);
             }
-            let r46 = r43 * r46;
-            let r46 = r44.mul_add(r42, r46);
-            let r46 = r45.mul_add(r25, r46);
-            let r25 = r46.abs();
-            let r25 = lit(0.999999).min(r25);
-            let r45 = (-r25).mul_add(lit(0.0187293), lit(0.074261));
-            let r45 = r25.mul_add(r45, lit(-0.2121144));
-            let r45 = r25.mul_add(r45, lit(1.5707288));
-            let r25 = lit(1.0) - r25;
-            let r25 = r25.sqrt();
-            let r25 = r45 * r25;
-            let r45 = lit(3.141592653589793) - r25;
-            let r45 = select(r46.ge(lit(0.0)), r25, r45);
-            let r25 = kept(3);
-            let r46 = r25.abs();
-            let r46 = lit(0.999999).min(r46);
-            let r42 = (-lit(0.0187293)).mul_add(r46, lit(0.074261));
-            let r42 = r46.mul_add(r42, lit(-0.2121144));
-            let r42 = r46.mul_add(r42, lit(1.5707288));
-            let r46 = lit(1.0) - r46;
-            let r46 = r46.sqrt();
-            let r46 = r42 * r46;
-            let r42 = lit(3.141592653589793) - r46;
-            let r42 = select(r25.ge(lit(0.0)), r46, r42);
-            let r46 = r21.abs();
-            let r46 = lit(0.999999).min(r46);
-            let r44 = (-lit(0.0187293)).mul_add(r46, lit(0.074261));
-            let r44 = r46.mul_add(r44, lit(-0.2121144));
-            let r44 = r46.mul_add(r44, lit(1.5707288));
-            let r46 = lit(1.0) - r46;
-            let r46 = r46.sqrt();
-            let r46 = r44 * r46;
-            let r44 = lit(3.141592653589793) - r46;
-            let r44 = select(r21.ge(lit(0.0)), r46, r44);
-            let r46 = r42 - r44;
-            let r46 = r46.abs();
-            let r45 = r45 - r46;
-            let r44 = r42 + r44;
-            let r46 = r44 - r46;
-            let r46 = r46.max(lit(0.0001));
-            let r46 = r45 / r46;
-            let r46 = lit(1.0) - r46;
-            let r46 = lit(0.0).max(r46);
-            let r46 = lit(1.0).min(r46);
-            let r45 = r46 * r46;
-            let r46 = (-lit(2.0)).mul_add(r46, lit(3.0));
-            let r46 = r45 * r46;
-            let r25 = r25.max(r21);
-            let r25 = lit(1.0) - r25;
-            let r25 = r46 * r25;
+            let r36 = r33 * r36;
+            let r36 = r34.mul_add(r32, r36);
+            let r36 = r35.mul_add(r31, r36);
+            let r31 = r36.abs();
+            let r31 = lit(0.999999).min(r31);
+            let r35 = (-r31).mul_add(lit(0.0187293), lit(0.074261));
+            let r35 = r31.mul_add(r35, lit(-0.2121144));
+            let r35 = r31.mul_add(r35, lit(1.5707288));
+            let r31 = lit(1.0) - r31;
+            let r31 = r31.sqrt();
+            let r31 = r35 * r31;
+            let r35 = lit(3.141592653589793) - r31;
+            let r35 = select(r36.ge(lit(0.0)), r31, r35);
+            let r31 = kept(3);
+            let r36 = r31.abs();
+            let r36 = lit(0.999999).min(r36);
+            let r32 = (-lit(0.0187293)).mul_add(r36, lit(0.074261));
+            let r32 = r36.mul_add(r32, lit(-0.2121144));
+            let r32 = r36.mul_add(r32, lit(1.5707288));
+            let r36 = lit(1.0) - r36;
+            let r36 = r36.sqrt();
+            let r36 = r32 * r36;
+            let r32 = lit(3.141592653589793) - r36;
+            let r32 = select(r31.ge(lit(0.0)), r36, r32);
+            let r36 = r21.abs();
+            let r36 = lit(0.999999).min(r36);
+            let r34 = (-lit(0.0187293)).mul_add(r36, lit(0.074261));
+            let r34 = r36.mul_add(r34, lit(-0.2121144));
+            let r34 = r36.mul_add(r34, lit(1.5707288));
+            let r36 = lit(1.0) - r36;
+            let r36 = r36.sqrt();
+            let r36 = r34 * r36;
+            let r34 = lit(3.141592653589793) - r36;
+            let r34 = select(r21.ge(lit(0.0)), r36, r34);
+            let r36 = r32 - r34;
+            let r36 = r36.abs();
+            let r35 = r35 - r36;
+            let r34 = r32 + r34;
+            let r36 = r34 - r36;
+            let r36 = r36.max(lit(0.0001));
+            let r36 = r35 / r36;
+            let r36 = lit(1.0) - r36;
+            let r36 = lit(0.0).max(r36);
+            let r36 = lit(1.0).min(r36);
+            let r35 = r36 * r36;
+            let r36 = (-lit(2.0)).mul_add(r36, lit(3.0));
+            let r36 = r35 * r36;
+            let r31 = r31.max(r21);
+            let r31 = lit(1.0) - r31;
+            let r31 = r36 * r31;
             let r21 = lit(1.0) - r21;
-            let r21 = r25 / r21;
-            let r25 = lit(1.0) - r21;
+            let r21 = r31 / r21;
+            let r31 = lit(1.0) - r21;
             let cube = cubes[2];
-            let at = texels297;
-            let [r46, r45, r44, _] = cube.sample_at(&at);
+            let at = texels280;
+            let [r36, r35, r34, _] = cube.sample_at(&at);
             let cube = cubes[1];
-            let at = texels298;
-            let [r42, r43, r24, _] = cube.sample_at(&at);
-            let r46 = r46 - r42;
-            let r42 = r15.mul_add(r46, r42);
-            let r42 = r21 * r42;
-            let r42 = r3.mul_add(r25, r42);
-            let r42 = r28 * r42;
-            let r3 = binary(Binary::Less, lit(0.0), r12);
-            let r46 = select(lit(0.0).lt(r2), r3, lit(0.0));
-            let r18 = u(134) - r8;
-            let r17 = u(133) - r7;
-            let r16 = u(132) - r6;
-            let r1 = r16 * r16;
-            let r1 = r17.mul_add(r17, r1);
-            let r1 = r18.mul_add(r18, r1);
-            let r14 = binary(Binary::Less, lit(1e-12), r1);
-            let r14 = select(r46.ge(lit(0.5)), r14, lit(0.0));
-            let r23 = u(126) * r23;
-            let r46 = select(r23.lt(lit(1.0)), r23, lit(0.0));
-            let r5 = r46 * lit(8.0);
-            let r46 = r46.max(lit(1e-24));
-            let r46 = r46.sqrt();
-            let r47 = lit(1.0) - r46;
-            let r1 = select(r14.ge(lit(0.5)), r1, lit(1.0));
-            let r48 = r1.sqrt();
-            let r48 = lit(0.5) * r48;
-            let r48 = select(r14.ge(lit(0.5)), r48, lit(1.0));
-            let r46 = r46 * lit(4.0);
-            let r49 = r47 * r47;
-            let r49 = r46 / r49;
-            let r46 = r48.mul_add(r48, r49);
-            let r46 = r46.sqrt();
-            let r46 = r48 + r46;
-            let r46 = lit(0.1).max(r46);
-            let r50 = r47 * r46;
-            let r50 = r50 * r50;
-            let r50 = r50 * r50;
-            let r50 = r5 / r50;
-            let r51 = r48 * r46;
-            let r51 = r51 - lit(1.0);
-            let r46 = r49 / r46;
-            let r46 = r48.mul_add(r46, lit(1.0));
-            let r46 = r51 / r46;
-            let r46 = r46.mul_add(r46, lit(1.0));
-            let r46 = r50 * r46;
-            let r46 = select(r23.lt(lit(1.0)), r46, lit(1.0));
-            let r20 = r20 * r20;
-            let r50 = r9 * r16;
-            let r50 = r10.mul_add(r17, r50);
-            let r50 = r11.mul_add(r18, r50);
-            let r50 = r50 * r50;
-            let r51 = r9 * r17;
-            let r51 = (-r10).mul_add(r16, r51);
-            let r16 = r11 * r16;
-            let r16 = (-r9).mul_add(r18, r16);
-            let r18 = r10 * r18;
-            let r18 = (-r11).mul_add(r17, r18);
-            let r18 = r18 * r18;
-            let r18 = r16.mul_add(r16, r18);
-            let r18 = r51.mul_add(r51, r18);
-            let r18 = r20.mul_add(r50, r18);
-            let r1 = r18 / r1;
-            let r1 = select(r14.ge(lit(0.5)), r1, lit(1.0));
-            let r18 = lit(3.141592653589793) * r1;
-            let r18 = r1 * r18;
-            let r18 = r20 / r18;
-            let r2 = select(r14.ge(lit(0.5)), r2, lit(1.0));
-            let r1 = lit(1.0) - r20;
-            let r50 = select(r14.ge(lit(0.5)), r12, lit(1.0));
-            let r51 = r50 * r50;
-            let r51 = r1.mul_add(r51, r20);
-            let r51 = r51.sqrt();
-            let r16 = r2 * r2;
-            let r16 = r1.mul_add(r16, r20);
-            let r16 = r16.sqrt();
-            let r16 = r50 * r16;
-            let r16 = r2.mul_add(r51, r16);
-            let r16 = lit(1e-6).max(r16);
-            let r16 = lit(0.5) / r16;
-            let r16 = r18 * r16;
-            let r16 = r46 * r16;
-            let r16 = select(r14.ge(lit(0.5)), r16, lit(0.0));
-            let r16 = r0 * r16;
-            let r16 = r4 * r16;
-            let r4 = select(lit(0.0).lt(r30), r3, lit(0.0));
-            let r0 = u(137) - r8;
-            let r14 = u(136) - r7;
-            let r46 = u(135) - r6;
-            let r18 = r46 * r46;
-            let r18 = r14.mul_add(r14, r18);
-            let r18 = r0.mul_add(r0, r18);
-            let r51 = binary(Binary::Less, lit(1e-12), r18);
-            let r51 = select(r4.ge(lit(0.5)), r51, lit(0.0));
-            let r18 = select(r51.ge(lit(0.5)), r18, lit(1.0));
-            let r4 = r18.sqrt();
-            let r4 = lit(0.5) * r4;
-            let r4 = select(r51.ge(lit(0.5)), r4, lit(1.0));
-            let r2 = r4.mul_add(r4, r49);
-            let r2 = r2.sqrt();
-            let r2 = r4 + r2;
-            let r2 = lit(0.1).max(r2);
-            let r50 = r47 * r2;
-            let r50 = r50 * r50;
-            let r50 = r50 * r50;
-            let r50 = r5 / r50;
-            let r17 = r4 * r2;
-            let r17 = r17 - lit(1.0);
-            let r2 = r49 / r2;
-            let r2 = r4.mul_add(r2, lit(1.0));
-            let r2 = r17 / r2;
-            let r2 = r2.mul_add(r2, lit(1.0));
-            let r2 = r50 * r2;
-            let r2 = select(r23.lt(lit(1.0)), r2, lit(1.0));
-            let r50 = r9 * r46;
-            let r50 = r10.mul_add(r14, r50);
-            let r50 = r11.mul_add(r0, r50);
-            let r50 = r50 * r50;
-            let r17 = r9 * r14;
-            let r17 = (-r10).mul_add(r46, r17);
-            let r46 = r11 * r46;
-            let r46 = (-r9).mul_add(r0, r46);
-            let r0 = r10 * r0;
-            let r0 = (-r11).mul_add(r14, r0);
-            let r0 = r0 * r0;
-            let r0 = r46.mul_add(r46, r0);
-            let r0 = r17.mul_add(r17, r0);
-            let r0 = r20.mul_add(r50, r0);
-            let r18 = r0 / r18;
-            let r18 = select(r51.ge(lit(0.5)), r18, lit(1.0));
-            let r0 = lit(3.141592653589793) * r18;
-            let r0 = r18 * r0;
-            let r0 = r20 / r0;
-            let r30 = select(r51.ge(lit(0.5)), r30, lit(1.0));
-            let r18 = select(r51.ge(lit(0.5)), r12, lit(1.0));
-            let r50 = r18 * r18;
-            let r50 = r1.mul_add(r50, r20);
-            let r50 = r50.sqrt();
-            let r17 = r30 * r30;
-            let r17 = r1.mul_add(r17, r20);
-            let r17 = r17.sqrt();
-            let r17 = r18 * r17;
-            let r17 = r30.mul_add(r50, r17);
-            let r17 = lit(1e-6).max(r17);
-            let r17 = lit(0.5) / r17;
-            let r17 = r0 * r17;
-            let r17 = r2 * r17;
-            let r17 = select(r51.ge(lit(0.5)), r17, lit(0.0));
-            let r17 = r31 * r17;
-            let r17 = r29 * r17;
-            let r29 = select(lit(0.0).lt(r34), r3, lit(0.0));
-            let r31 = u(140) - r8;
-            let r51 = u(139) - r7;
-            let r2 = u(138) - r6;
-            let r0 = r2 * r2;
-            let r0 = r51.mul_add(r51, r0);
-            let r0 = r31.mul_add(r31, r0);
-            let r50 = binary(Binary::Less, lit(1e-12), r0);
-            let r50 = select(r29.ge(lit(0.5)), r50, lit(0.0));
-            let r0 = select(r50.ge(lit(0.5)), r0, lit(1.0));
-            let r29 = r0.sqrt();
-            let r29 = lit(0.5) * r29;
-            let r29 = select(r50.ge(lit(0.5)), r29, lit(1.0));
-            let r30 = r29.mul_add(r29, r49);
-            let r30 = r30.sqrt();
-            let r30 = r29 + r30;
-            let r30 = lit(0.1).max(r30);
-            let r18 = r47 * r30;
-            let r18 = r18 * r18;
-            let r18 = r18 * r18;
-            let r18 = r5 / r18;
-            let r46 = r29 * r30;
-            let r46 = r46 - lit(1.0);
-            let r30 = r49 / r30;
-            let r30 = r29.mul_add(r30, lit(1.0));
-            let r30 = r46 / r30;
-            let r30 = r30.mul_add(r30, lit(1.0));
-            let r30 = r18 * r30;
-            let r30 = select(r23.lt(lit(1.0)), r30, lit(1.0));
-            let r18 = r9 * r2;
-            let r18 = r10.mul_add(r51, r18);
-            let r18 = r11.mul_add(r31, r18);
-            let r18 = r18 * r18;
-            let r46 = r9 * r51;
-            let r46 = (-r10).mul_add(r2, r46);
-            let r2 = r11 * r2;
-            let r2 = (-r9).mul_add(r31, r2);
-            let r31 = r10 * r31;
-            let r31 = (-r11).mul_add(r51, r31);
-            let r31 = r31 * r31;
-            let r31 = r2.mul_add(r2, r31);
-            let r31 = r46.mul_add(r46, r31);
-            let r31 = r20.mul_add(r18, r31);
-            let r0 = r31 / r0;
-            let r0 = select(r50.ge(lit(0.5)), r0, lit(1.0));
-            let r31 = lit(3.141592653589793) * r0;
-            let r31 = r0 * r31;
-            let r31 = r20 / r31;
-            let r34 = select(r50.ge(lit(0.5)), r34, lit(1.0));
-            let r0 = select(r50.ge(lit(0.5)), r12, lit(1.0));
-            let r18 = r0 * r0;
-            let r18 = r1.mul_add(r18, r20);
-            let r18 = r18.sqrt();
-            let r46 = r34 * r34;
-            let r46 = r1.mul_add(r46, r20);
-            let r46 = r46.sqrt();
-            let r46 = r0 * r46;
-            let r46 = r34.mul_add(r18, r46);
-            let r46 = lit(1e-6).max(r46);
-            let r46 = lit(0.5) / r46;
-            let r46 = r31 * r46;
-            let r46 = r30 * r46;
-            let r46 = select(r50.ge(lit(0.5)), r46, lit(0.0));
-            let r46 = r35 * r46;
-            let r46 = r33 * r46;
-            let r3 = select(lit(0.0).lt(r38), r3, lit(0.0));
-            let r8 = u(143) - r8;
-            let r7 = u(142) - r7;
-            let r6 = u(141) - r6;
-            let r33 = r6 * r6;
-            let r33 = r7.mul_add(r7, r33);
-            let r33 = r8.mul_add(r8, r33);
-            let r35 = binary(Binary::Less, lit(1e-12), r33);
-            let r35 = select(r3.ge(lit(0.5)), r35, lit(0.0));
-            let r33 = select(r35.ge(lit(0.5)), r33, lit(1.0));
-            let r3 = r33.sqrt();
-            let r3 = lit(0.5) * r3;
-            let r3 = select(r35.ge(lit(0.5)), r3, lit(1.0));
-            let r50 = r3.mul_add(r3, r49);
-            let r50 = r50.sqrt();
-            let r50 = r3 + r50;
-            let r50 = lit(0.1).max(r50);
-            let r47 = r47 * r50;
-            let r47 = r47 * r47;
-            let r47 = r47 * r47;
-            let r47 = r5 / r47;
-            let r5 = r3 * r50;
-            let r5 = r5 - lit(1.0);
-            let r50 = r49 / r50;
-            let r50 = r3.mul_add(r50, lit(1.0));
-            let r50 = r5 / r50;
-            let r50 = r50.mul_add(r50, lit(1.0));
-            let r50 = r47 * r50;
-            let r50 = select(r23.lt(lit(1.0)), r50, lit(1.0));
-            let r23 = r9 * r6;
-            let r23 = r10.mul_add(r7, r23);
-            let r23 = r11.mul_add(r8, r23);
-            let r23 = r23 * r23;
-            let r47 = r9 * r7;
-            let r47 = (-r10).mul_add(r6, r47);
-            let r6 = r11 * r6;
-            let r6 = (-r9).mul_add(r8, r6);
-            let r8 = r10 * r8;
-            let r8 = (-r11).mul_add(r7, r8);
-            let r8 = r8 * r8;
-            let r8 = r6.mul_add(r6, r8);
-            let r8 = r47.mul_add(r47, r8);
-            let r8 = r20.mul_add(r23, r8);
-            let r33 = r8 / r33;
-            let r33 = select(r35.ge(lit(0.5)), r33, lit(1.0));
-            let r8 = lit(3.141592653589793) * r33;
-            let r8 = r33 * r8;
-            let r8 = r20 / r8;
-            let r38 = select(r35.ge(lit(0.5)), r38, lit(1.0));
-            let r12 = select(r35.ge(lit(0.5)), r12, lit(1.0));
-            let r33 = r12 * r12;
-            let r33 = r1.mul_add(r33, r20);
-            let r33 = r33.sqrt();
-            let r23 = r38 * r38;
-            let r20 = r1.mul_add(r23, r20);
-            let r20 = r20.sqrt();
-            let r20 = r12 * r20;
-            let r20 = r38.mul_add(r33, r20);
-            let r20 = lit(1e-6).max(r20);
-            let r20 = lit(0.5) / r20;
-            let r20 = r8 * r20;
-            let r20 = r50 * r20;
-            let r20 = select(r35.ge(lit(0.5)), r20, lit(0.0));
-            let r20 = r39 * r20;
-            let r20 = r37 * r20;
-            let r37 = u(162) * r20;
-            let r37 = u(163).mul_add(r46, r37);
-            let r37 = u(164).mul_add(r17, r37);
-            let r37 = u(165).mul_add(r16, r37);
-            let r37 = u(127).mul_add(r42, r37);
-            let r37 = r22.mul_add(r41, r37);
-            put(0, i, r37);
-            let r41 = samples(22);
-            let r22 = r28 * u(166);
-            let r22 = lit(1.0).min(r22);
-            let r22 = (-u(128)).mul_add(r22, lit(1.0));
-            let r42 = r13.mul_add(u(167), u(168));
-            let r42 = r22 * r42;
-            let r22 = kept(1);
-            let r39 = r40 * u(169);
-            let r39 = r36.mul_add(u(170), r39);
-            let r39 = r32.mul_add(u(171), r39);
-            let r39 = r19.mul_add(u(172), r39);
-            let r39 = r22.mul_add(r26, r39);
-            let r39 = r42 * r39;
-            let r42 = samples(24);
-            let r45 = r45 - r43;
-            let r43 = r15.mul_add(r45, r43);
-            let r43 = r21 * r43;
-            let r43 = r25.mul_add(r42, r43);
-            let r43 = r28 * r43;
-            let r42 = r20 * u(173);
-            let r42 = r46.mul_add(u(174), r42);
-            let r42 = r17.mul_add(u(175), r42);
-            let r42 = r16.mul_add(u(176), r42);
-            let r42 = u(166).mul_add(r43, r42);
-            let r42 = r41.mul_add(r39, r42);
-            put(1, i, r42);
-            let r39 = samples(25);
-            let r41 = r28 * u(177);
-            let r41 = lit(1.0).min(r41);
-            let r41 = (-u(128)).mul_add(r41, lit(1.0));
-            let r13 = r13.mul_add(u(178), u(179));
-            let r13 = r41 * r13;
-            let r41 = kept(2);
-            let r40 = r40 * u(180);
-            let r40 = r36.mul_add(u(181), r40);
-            let r40 = r32.mul_add(u(182), r40);
-            let r40 = r19.mul_add(u(183), r40);
-            let r40 = r41.mul_add(r27, r40);
-            let r40 = r13 * r40;
-            let r13 = samples(27);
-            let r44 = r44 - r24;
-            let r24 = r15.mul_add(r44, r24);
-            let r24 = r21 * r24;
-            let r24 = r25.mul_add(r13, r24);
-            let r24 = r28 * r24;
-            let r20 = r20 * u(184);
-            let r20 = r46.mul_add(u(185), r20);
-            let r20 = r17.mul_add(u(186), r20);
-            let r20 = r16.mul_add(u(187), r20);
-            let r20 = u(177).mul_add(r24, r20);
-            let r20 = r39.mul_add(r40, r20);
-            put(2, i, r20);
+            let at = texels281;
+            let [r32, r33, r30, _] = cube.sample_at(&at);
+            let r36 = r36 - r32;
+            let r32 = r15.mul_add(r36, r32);
+            let r32 = r21 * r32;
+            let r32 = r29.mul_add(r31, r32);
+            let r32 = r28 * r32;
+            let r32 = u(139) * r32;
+            let r29 = samples(22);
+            let r36 = r28 * u(155);
+            let r36 = lit(1.0).min(r36);
+            let r36 = (-u(140)).mul_add(r36, lit(1.0));
+            let r18 = r13.mul_add(u(156), u(157));
+            let r18 = r36 * r18;
+            let r36 = kept(1);
+            let r26 = r36 * r26;
+            let r36 = samples(24);
+            let r35 = r35 - r33;
+            let r33 = r15.mul_add(r35, r33);
+            let r33 = r21 * r33;
+            let r33 = r31.mul_add(r36, r33);
+            let r33 = r28 * r33;
+            let r33 = u(155) * r33;
+            let r36 = samples(25);
+            let r35 = r28 * u(158);
+            let r35 = lit(1.0).min(r35);
+            let r35 = (-u(140)).mul_add(r35, lit(1.0));
+            let r13 = r13.mul_add(u(159), u(160));
+            let r13 = r35 * r13;
+            let r35 = kept(2);
+            let r27 = r35 * r27;
+            let r35 = samples(27);
+            let r34 = r34 - r30;
+            let r30 = r15.mul_add(r34, r30);
+            let r30 = r21 * r30;
+            let r30 = r31.mul_add(r35, r30);
+            let r30 = r28 * r30;
+            let r30 = u(158) * r30;
+            let mut made = [[lit(0.0); 2]; 4];
+            for m in 0..4 {
+                let r28 = samples([13, 14, 15, 16][m]);
+                let r35 = r9 * own(m, 0);
+                let r35 = r10.mul_add(own(m, 1), r35);
+                let r35 = r11.mul_add(own(m, 2), r35);
+                let r31 = lit(0.0).max(r35);
+                let r21 = r28 * r31;
+                let r34 = select(lit(0.0).lt(r35), r25, lit(0.0));
+                let r15 = own(m, 2) - r8;
+                let r17 = own(m, 1) - r7;
+                let r16 = own(m, 0) - r6;
+                let r1 = r16 * r16;
+                let r1 = r17.mul_add(r17, r1);
+                let r1 = r15.mul_add(r15, r1);
+                let r14 = binary(Binary::Less, lit(1e-12), r1);
+                let r14 = select(r34.ge(lit(0.5)), r14, lit(0.0));
+                let r1 = select(r14.ge(lit(0.5)), r1, lit(1.0));
+                let r34 = r1.sqrt();
+                let r34 = lit(0.5) * r34;
+                let r34 = select(r14.ge(lit(0.5)), r34, lit(1.0));
+                let r5 = r34.mul_add(r34, r19);
+                let r5 = r5.sqrt();
+                let r5 = r34 + r5;
+                let r5 = r5.max(lit(0.1));
+                let r37 = r0 * r5;
+                let r37 = r37 * r37;
+                let r37 = r37 * r37;
+                let r37 = r2 / r37;
+                let r38 = r34.mul_add(r5, lit(-1.0));
+                let r5 = r19 / r5;
+                let r5 = r34.mul_add(r5, lit(1.0));
+                let r5 = r38 / r5;
+                let r5 = r5.mul_add(r5, lit(1.0));
+                let r5 = r37 * r5;
+                let r5 = select(r23.lt(lit(1.0)), r5, lit(1.0));
+                let r37 = r9 * r17;
+                let r37 = (-r10).mul_add(r16, r37);
+                let r38 = r11 * r16;
+                let r38 = (-r9).mul_add(r15, r38);
+                let r16 = r9 * r16;
+                let r16 = r10.mul_add(r17, r16);
+                let r16 = r11.mul_add(r15, r16);
+                let r16 = r16 * r16;
+                let r15 = r10 * r15;
+                let r15 = (-r11).mul_add(r17, r15);
+                let r15 = r15 * r15;
+                let r15 = r20.mul_add(r16, r15);
+                let r15 = r38.mul_add(r38, r15);
+                let r15 = r37.mul_add(r37, r15);
+                let r1 = r15 / r1;
+                let r1 = select(r14.ge(lit(0.5)), r1, lit(1.0));
+                let r15 = lit(3.141592653589793) * r1;
+                let r15 = r1 * r15;
+                let r15 = r20 / r15;
+                let r35 = select(r14.ge(lit(0.5)), r35, lit(1.0));
+                let r1 = select(r14.ge(lit(0.5)), r12, lit(1.0));
+                let r37 = r1 * r1;
+                let r37 = r4.mul_add(r37, r20);
+                let r37 = r37.sqrt();
+                let r38 = r35 * r35;
+                let r38 = r4.mul_add(r38, r20);
+                let r38 = r38.sqrt();
+                let r38 = r1 * r38;
+                let r38 = r35.mul_add(r37, r38);
+                let r38 = lit(1e-6).max(r38);
+                let r38 = lit(0.5) / r38;
+                let r38 = r15 * r38;
+                let r38 = r5 * r38;
+                let r38 = select(r14.ge(lit(0.5)), r38, lit(0.0));
+                let r38 = r31 * r38;
+                let r38 = r28 * r38;
+                made[m] = [r21, r38];
+            }
+            let [r21, r38] = made[0];
+            let [r5, r40] = made[1];
+            let [r34, r42] = made[2];
+            let [r15, r20] = made[3];
+            let r24 = r21.mul_add(u(165), r24);
+            let r24 = r5.mul_add(u(166), r24);
+            let r24 = r34.mul_add(u(167), r24);
+            let r24 = r15.mul_add(u(168), r24);
+            let r24 = r3 * r24;
+            let r32 = u(169).mul_add(r38, r32);
+            let r32 = u(170).mul_add(r40, r32);
+            let r32 = u(171).mul_add(r42, r32);
+            let r32 = u(172).mul_add(r20, r32);
+            let r32 = r22.mul_add(r24, r32);
+            put(0, i, r32);
+            let r26 = r21.mul_add(u(173), r26);
+            let r26 = r5.mul_add(u(174), r26);
+            let r26 = r34.mul_add(u(175), r26);
+            let r26 = r15.mul_add(u(176), r26);
+            let r26 = r18 * r26;
+            let r33 = r38.mul_add(u(177), r33);
+            let r33 = r40.mul_add(u(178), r33);
+            let r33 = r42.mul_add(u(179), r33);
+            let r33 = r20.mul_add(u(180), r33);
+            let r33 = r29.mul_add(r26, r33);
+            put(1, i, r33);
+            let r27 = r21.mul_add(u(181), r27);
+            let r27 = r5.mul_add(u(182), r27);
+            let r27 = r34.mul_add(u(183), r27);
+            let r27 = r15.mul_add(u(184), r27);
+            let r27 = r13 * r27;
+            let r30 = r38.mul_add(u(185), r30);
+            let r30 = r40.mul_add(u(186), r30);
+            let r30 = r42.mul_add(u(187), r30);
+            let r30 = r20.mul_add(u(188), r30);
+            let r30 = r36.mul_add(r27, r30);
+            put(2, i, r30);
+            }
         }
         },
     );
 }
 
 #[inline(never)]
-fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
+fn lit_strength_moved<S: Simd, R: Part<S>>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
-        let lit = |x: f64| Lanes::splat(simd, x as f32);
-        let numbers: &[f32; 269] = block.uniforms();
-        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let lit = |x: f64| R::splat(simd, x as f32);
+        let numbers: &[f32; 246] = block.uniforms();
+        let u = |k: usize| R::splat(simd, numbers[k]);
+        let of_members = numbers.as_chunks::<3>().0;
+        let own = |m: usize, k: usize| R::splat(simd, of_members[m][k]);
         let fields = block.fields::<28>();
         let cubes = block.cubes;
         let Some(columns) = block.columns::<27>() else { return };
-        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
         for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
-            let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<4>(i);
-            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            for part in 0..R::PARTS {
+            let samples = |k: usize| -> R { block.number(simd, fields[k], at, part) };
+            let put = |k: usize, i: usize, value: R| value.put(&columns[k][i], part);
+            let kept = |k: usize| R::of_part(simd, &rows[k], part);
             let r0 = samples(3);
             let r1 = samples(2);
             let r2 = samples(5);
             let r3 = samples(4);
             let r4 = samples(7);
             let r5 = samples(6);
-            let r6 = r0.mul_add(u(0), r1);
-            let r7 = u(0).mul_add(r2, r3);
-            let r8 = u(0).mul_add(r4, r5);
+            let r6 = r0.mul_add(u(12), r1);
+            let r7 = u(12).mul_add(r2, r3);
+            let r8 = u(12).mul_add(r4, r5);
             let r9 = samples(8);
             let r10 = samples(9);
             let r11 = samples(1);
@@ -10455,1339 +9793,613 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let [r31, r32] = point.tangent([r25, r26, r27]);
             let texels70 = cubes[4].footprint_at(r28, r29, r30);
             let texels72 = texels70;
-            let texels575 = texels70;
-            let texels576 = texels70;
+            let texels530 = texels70;
+            let texels531 = texels70;
             let cube = cubes[4];
             let at = texels70;
             let [r27, r26, r25, _] = cube.sample_at(&at);
-            let r24 = u(6) * r27;
+            let r24 = u(18) * r27;
             let cube = cubes[3];
             let at = texels72;
             let [r23, r8, r33, _] = cube.sample_at(&at);
             let r24 = r24 - r23;
-            let r34 = u(6) * r26;
+            let r34 = u(18) * r26;
             let r34 = r34 - r8;
-            let r35 = u(6) * r25;
+            let r35 = u(18) * r25;
             let r35 = r35 - r33;
             let r36 = samples(11);
             let r37 = select(r36.ge(lit(1.2e-38)), r36, lit(1.0));
             let r37 = r37.log2();
-            let r38 = u(8) * r37;
+            let r38 = u(20) * r37;
             let r38 = r38.exp2();
             let r37 = r37 * lit(0.6931471805599453);
             let r37 = r38 * r37;
             let r37 = select(r36.ge(lit(1.2e-38)), r37, lit(0.0));
-            let r38 = select(r36.ge(lit(1.2e-38)), r38, u(10));
+            let r38 = select(r36.ge(lit(1.2e-38)), r38, u(22));
             let r36 = samples(10);
             let r23 = r36.mul_add(r24, r23);
             let r8 = r36.mul_add(r34, r8);
             let r33 = r36.mul_add(r35, r33);
-            let r35 = u(11) * r36;
+            let r35 = u(23) * r36;
             let r35 = -r35;
-            let r34 = (-r36).mul_add(u(12), lit(1.0));
-            let r24 = u(11) * r34;
+            let r34 = (-r36).mul_add(u(24), lit(1.0));
+            let r24 = u(23) * r34;
             let r34 = select(r24.lt(lit(0.05)), lit(0.0), r34);
             let r35 = select(r24.lt(lit(0.05)), lit(0.0), r35);
             let r24 = r24.max(lit(0.05));
-            let r39 = r24 * lit(2.0);
-            let r40 = r24 * r24;
-            let r41 = r40 * r39;
-            let r41 = lit(2.0) * r41;
-            let r42 = r40 * lit(-3.321928);
-            let r42 = r40 * r42;
-            let r42 = r42.exp2();
-            let r43 = r40 * lit(-6.643856);
-            let r44 = r42 * lit(0.6931471805599453);
-            let r44 = r43 * r44;
-            let r45 = binary(Binary::Less, lit(0.0), r42);
-            let r46 = binary(Binary::Less, r42, lit(0.0));
-            let r46 = r45 - r46;
-            let r46 = r44 * r46;
-            let r45 = lit(0.0).max(r0);
-            let r47 = lit(1e-6).max(r45);
-            let r48 = r47 + r24;
+            let r39 = r24 * r24;
+            let r40 = r39 * lit(-3.321928);
+            let r40 = r39 * r40;
+            let r40 = r40.exp2();
+            let r41 = r39 * lit(-6.643856);
+            let r42 = r40 * lit(0.6931471805599453);
+            let r42 = r41 * r42;
+            let r43 = binary(Binary::Less, lit(0.0), r40);
+            let r44 = binary(Binary::Less, r40, lit(0.0));
+            let r44 = r43 - r44;
+            let r44 = r42 * r44;
+            let r43 = lit(0.0).max(r0);
+            let r45 = lit(1e-6).max(r43);
+            let r46 = r45 + r24;
+            let r46 = unary(Unary::Reciprocal, r46);
+            let r47 = lit(1.0) + r24;
+            let r48 = r45 * r47;
+            let r48 = r48 * r46;
+            let r47 = r47 - r48;
+            let r49 = r45 - r48;
+            let r49 = r49 * r46;
+            let r48 = r48.sqrt();
+            let r49 = lit(0.5) * r49;
+            let r50 = lit(2.0) * r48;
+            let r50 = r50 - lit(1.0);
             let r48 = unary(Unary::Reciprocal, r48);
-            let r49 = lit(1.0) + r24;
-            let r50 = r47 * r49;
-            let r50 = r50 * r48;
-            let r49 = r49 - r50;
-            let r51 = r47 - r50;
-            let r51 = r51 * r48;
-            let r50 = r50.sqrt();
-            let r51 = lit(0.5) * r51;
-            let r52 = lit(2.0) * r50;
-            let r52 = r52 - lit(1.0);
-            let r50 = unary(Unary::Reciprocal, r50);
-            let r51 = r51 * r50;
-            let r53 = r24 * lit(1.0526316);
-            let r53 = r53 - lit(0.05263158);
-            let r24 = r24 * lit(4.0);
-            let r54 = r52 * lit(-0.0004120192);
-            let r55 = r53.mul_add(lit(0.98937804), lit(0.017514367));
-            let r55 = r54 + r55;
-            let r56 = r53 * lit(-2.7068534);
-            let r57 = r56 + lit(1.8737313);
-            let r56 = r56 + r57;
-            let r56 = r52.mul_add(lit(0.98937804), r56);
-            let r57 = r53.mul_add(r57, lit(0.04185391));
-            let r57 = r52.mul_add(r55, r57);
-            let r55 = r54 + r55;
-            let r54 = r53 * lit(6.0472665);
-            let r58 = r54 + lit(-4.3290744);
-            let r54 = r54 + r58;
-            let r58 = r53.mul_add(r58, lit(-1.5091898));
-            let r54 = r53.mul_add(r54, r58);
-            let r54 = r52.mul_add(r56, r54);
-            let r58 = r53.mul_add(r58, lit(-0.05214465));
-            let r58 = r52.mul_add(r57, r58);
-            let r57 = r52.mul_add(r55, r57);
-            let r55 = r53 * lit(-33.136127);
-            let r56 = r55 + lit(15.021135);
-            let r55 = r55 + r56;
-            let r56 = r53.mul_add(r56, lit(-0.7565581));
-            let r55 = r53.mul_add(r55, r56);
-            let r56 = r53.mul_add(r56, lit(-4.4350986));
-            let r55 = r53.mul_add(r55, r56);
-            let r55 = r52.mul_add(r54, r55);
-            let r56 = r53.mul_add(r56, lit(-0.1654946));
-            let r56 = r52.mul_add(r58, r56);
-            let r58 = r52.mul_add(r57, r58);
-            let r57 = r53 * lit(20.749594);
-            let r54 = r57 + lit(-18.797396);
-            let r57 = r57 + r54;
-            let r54 = r53.mul_add(r54, lit(2.8044958));
-            let r57 = r53.mul_add(r57, r54);
-            let r54 = r53.mul_add(r54, lit(4.5802555));
-            let r57 = r53.mul_add(r57, r54);
-            let r54 = r53.mul_add(r54, lit(0.67946917));
-            let r57 = r53.mul_add(r57, r54);
-            let r57 = r52.mul_add(r55, r57);
-            let r54 = r53.mul_add(r54, lit(0.03459878));
-            let r54 = r52.mul_add(r56, r54);
-            let r56 = r52.mul_add(r58, r56);
-            let r58 = r53 * lit(-0.6919632);
-            let r55 = r58 + lit(21.897259);
-            let r58 = r58 + r55;
-            let r55 = r53.mul_add(r55, lit(14.292728));
-            let r58 = r53.mul_add(r58, r55);
-            let r55 = r53.mul_add(r55, lit(-6.076299));
-            let r58 = r53.mul_add(r58, r55);
-            let r55 = r53.mul_add(r55, lit(3.5632777));
-            let r58 = r53.mul_add(r58, r55);
-            let r55 = r53.mul_add(r55, lit(2.740612));
-            let r58 = r53.mul_add(r58, r55);
-            let r58 = r52.mul_add(r57, r58);
-            let r55 = r53.mul_add(r55, lit(0.123854704));
-            let r55 = r52.mul_add(r54, r55);
-            let r57 = r52 * lit(-0.73189694);
-            let r59 = r53.mul_add(lit(5.5059476), lit(-2.4792378));
-            let r59 = r57 + r59;
-            let r60 = r53 * lit(-15.361438);
-            let r61 = r60 + lit(15.843192);
-            let r60 = r60 + r61;
-            let r60 = r52.mul_add(lit(5.5059476), r60);
-            let r61 = r53.mul_add(r61, lit(-2.9153898));
-            let r61 = r52.mul_add(r59, r61);
-            let r59 = r57 + r59;
-            let r57 = r53 * lit(22.008505);
-            let r62 = r57 + lit(-31.626265);
-            let r57 = r57 + r62;
-            let r62 = r53.mul_add(r62, lit(10.849422));
-            let r57 = r53.mul_add(r57, r62);
-            let r57 = r52.mul_add(r60, r57);
-            let r62 = r53.mul_add(r62, lit(0.022259254));
-            let r62 = r52.mul_add(r61, r62);
-            let r61 = r52.mul_add(r59, r61);
-            let r59 = r53 * lit(-32.95722);
-            let r60 = r59 + lit(47.940353);
-            let r59 = r59 + r60;
-            let r60 = r53.mul_add(r60, lit(-24.777008));
-            let r59 = r53.mul_add(r59, r60);
-            let r60 = r53.mul_add(r60, lit(-7.8058953));
-            let r59 = r53.mul_add(r59, r60);
-            let r59 = r52.mul_add(r57, r59);
-            let r60 = r53.mul_add(r60, lit(3.2521393));
-            let r60 = r52.mul_add(r62, r60);
-            let r62 = r52.mul_add(r61, r62);
-            let r61 = r53 * lit(40.38964);
-            let r57 = r61 + lit(-85.03923);
-            let r61 = r61 + r57;
-            let r57 = r53.mul_add(r57, lit(27.656086));
-            let r61 = r53.mul_add(r61, r57);
-            let r57 = r53.mul_add(r57, lit(-0.31556824));
-            let r61 = r53.mul_add(r61, r57);
-            let r57 = r53.mul_add(r57, lit(-10.776063));
-            let r61 = r53.mul_add(r61, r57);
-            let r61 = r52.mul_add(r59, r61);
-            let r57 = r53.mul_add(r57, lit(2.938116));
-            let r57 = r52.mul_add(r60, r57);
-            let r60 = r52.mul_add(r62, r60);
-            let r62 = r53 * lit(11.477421);
-            let r59 = r62 + lit(-28.036684);
-            let r62 = r62 + r59;
-            let r59 = r53.mul_add(r59, lit(86.54406));
-            let r62 = r53.mul_add(r62, r59);
-            let r59 = r53.mul_add(r59, lit(-38.168766));
-            let r62 = r53.mul_add(r62, r59);
-            let r59 = r53.mul_add(r59, lit(31.440067));
-            let r62 = r53.mul_add(r62, r59);
-            let r59 = r53.mul_add(r59, lit(1.5111662));
-            let r62 = r53.mul_add(r62, r59);
-            let r62 = r52.mul_add(r61, r62);
-            let r59 = r53.mul_add(r59, lit(1.0));
-            let r59 = r52.mul_add(r57, r59);
-            let r59 = unary(Unary::Reciprocal, r59);
-            let r57 = r52.mul_add(r60, r57);
-            let r55 = r55 * r59;
-            let r54 = r52.mul_add(r56, r54);
-            let r58 = (-r55).mul_add(r62, r58);
-            let r54 = (-r55).mul_add(r57, r54);
-            let r58 = r58 * r59;
-            let r58 = lit(1.0526316) * r58;
-            let r59 = r54 * r59;
-            let r51 = r59 * r51;
-            let r58 = lit(2.0).mul_add(r51, r58);
-            let r59 = r55 * r59;
-            let r58 = r55 * r58;
-            let r58 = lit(2.0) * r58;
-            let r55 = (-r55).mul_add(r55, lit(1.0));
-            let r51 = r40 * lit(2.0);
-            let r40 = r40 * r40;
-            let r54 = r47 + r51;
-            let r54 = unary(Unary::Reciprocal, r54);
-            let r51 = lit(1.0) + r51;
-            let r57 = r47 * r51;
-            let r57 = r57 * r54;
-            let r47 = r47 - r57;
-            let r51 = r51 - r57;
-            let r47 = r24 * r47;
-            let r57 = r57.sqrt();
-            let r47 = r47 * r54;
-            let r47 = lit(0.5) * r47;
-            let r24 = unary(Unary::Reciprocal, r57);
-            let r47 = r47 * r24;
-            let r57 = lit(1.0) - r57;
-            let r62 = r57 * lit(-51.966053);
-            let r56 = r53.mul_add(lit(-570.10706), lit(294.6542));
-            let r56 = r62 + r56;
-            let r52 = r53 * lit(-1151.2646);
-            let r60 = r52 + lit(2261.705);
-            let r52 = r52 + r60;
-            let r52 = r57.mul_add(lit(-570.10706), r52);
-            let r60 = r53.mul_add(r60, lit(-958.72577));
-            let r60 = r57.mul_add(r56, r60);
-            let r56 = r62 + r56;
-            let r62 = r53 * lit(3107.8694);
-            let r61 = r62 + lit(771.69995);
-            let r62 = r62 + r61;
-            let r61 = r53.mul_add(r61, lit(-3104.6565));
-            let r62 = r53.mul_add(r62, r61);
-            let r62 = r57.mul_add(r52, r62);
-            let r61 = r53.mul_add(r61, lit(1684.868));
-            let r61 = r57.mul_add(r60, r61);
-            let r60 = r57.mul_add(r56, r60);
-            let r56 = r53 * lit(-2028.784);
-            let r52 = r56 + lit(-2819.9106);
-            let r56 = r56 + r52;
-            let r52 = r53.mul_add(r52, lit(-853.38617));
-            let r56 = r53.mul_add(r56, r52);
-            let r52 = r53.mul_add(r52, lit(2724.646));
-            let r56 = r53.mul_add(r56, r52);
-            let r56 = r57.mul_add(r62, r56);
-            let r52 = r53.mul_add(r52, lit(-1027.6843));
-            let r52 = r57.mul_add(r61, r52);
-            let r61 = r57.mul_add(r60, r61);
-            let r60 = r53 * lit(-78.26518);
-            let r62 = r60 + lit(1147.8971);
-            let r60 = r60 + r62;
-            let r62 = r53.mul_add(r62, lit(1380.4232));
-            let r60 = r53.mul_add(r60, r62);
-            let r62 = r53.mul_add(r62, lit(99.29577));
-            let r60 = r53.mul_add(r60, r62);
-            let r62 = r53.mul_add(r62, lit(-341.66718));
-            let r60 = r53.mul_add(r60, r62);
-            let r60 = r57.mul_add(r56, r60);
-            let r62 = r53.mul_add(r62, lit(402.98117));
-            let r62 = r57.mul_add(r52, r62);
-            let r52 = r57.mul_add(r61, r52);
-            let r61 = r53 * lit(99.87072);
-            let r56 = r61 + lit(403.23367);
-            let r61 = r61 + r56;
-            let r56 = r53.mul_add(r56, lit(-329.77115));
-            let r61 = r53.mul_add(r61, r56);
-            let r56 = r53.mul_add(r56, lit(204.95244));
-            let r61 = r53.mul_add(r61, r56);
-            let r56 = r53.mul_add(r56, lit(-16.22698));
-            let r61 = r53.mul_add(r61, r56);
-            let r56 = r53.mul_add(r56, lit(0.36739597));
-            let r61 = r53.mul_add(r61, r56);
-            let r61 = r57.mul_add(r60, r61);
-            let r56 = r53.mul_add(r56, lit(-0.0013912567));
-            let r56 = r57.mul_add(r62, r56);
-            let r60 = r57 * lit(-52.70797);
-            let r63 = r53.mul_add(lit(-754.39386), lit(291.25507));
-            let r63 = r60 + r63;
-            let r64 = r53 * lit(-1056.3835);
-            let r65 = r64 + lit(2750.1265);
-            let r64 = r64 + r65;
-            let r64 = r57.mul_add(lit(-754.39386), r64);
-            let r65 = r53.mul_add(r65, lit(-946.7237));
-            let r65 = r57.mul_add(r63, r65);
-            let r63 = r60 + r63;
-            let r60 = r53 * lit(3827.2642);
-            let r66 = r60 + lit(383.2556);
-            let r60 = r60 + r66;
-            let r66 = r53.mul_add(r66, lit(-3586.956));
-            let r60 = r53.mul_add(r60, r66);
-            let r60 = r57.mul_add(r64, r60);
-            let r66 = r53.mul_add(r66, lit(1672.4937));
-            let r66 = r57.mul_add(r65, r66);
-            let r65 = r57.mul_add(r63, r65);
-            let r63 = r53 * lit(-290.88354);
-            let r64 = r63 + lit(-6400.9927);
+            let r49 = r49 * r48;
+            let r51 = r24 * lit(1.0526316);
+            let r51 = r51 - lit(0.05263158);
+            let r52 = r50 * lit(-0.0004120192);
+            let r53 = r51.mul_add(lit(0.98937804), lit(0.017514367));
+            let r53 = r52 + r53;
+            let r54 = r51 * lit(-2.7068534);
+            let r55 = r54 + lit(1.8737313);
+            let r54 = r54 + r55;
+            let r54 = r50.mul_add(lit(0.98937804), r54);
+            let r55 = r51.mul_add(r55, lit(0.04185391));
+            let r55 = r50.mul_add(r53, r55);
+            let r53 = r52 + r53;
+            let r52 = r51 * lit(6.0472665);
+            let r56 = r52 + lit(-4.3290744);
+            let r52 = r52 + r56;
+            let r56 = r51.mul_add(r56, lit(-1.5091898));
+            let r52 = r51.mul_add(r52, r56);
+            let r52 = r50.mul_add(r54, r52);
+            let r56 = r51.mul_add(r56, lit(-0.05214465));
+            let r56 = r50.mul_add(r55, r56);
+            let r55 = r50.mul_add(r53, r55);
+            let r53 = r51 * lit(-33.136127);
+            let r54 = r53 + lit(15.021135);
+            let r53 = r53 + r54;
+            let r54 = r51.mul_add(r54, lit(-0.7565581));
+            let r53 = r51.mul_add(r53, r54);
+            let r54 = r51.mul_add(r54, lit(-4.4350986));
+            let r53 = r51.mul_add(r53, r54);
+            let r53 = r50.mul_add(r52, r53);
+            let r54 = r51.mul_add(r54, lit(-0.1654946));
+            let r54 = r50.mul_add(r56, r54);
+            let r56 = r50.mul_add(r55, r56);
+            let r55 = r51 * lit(20.749594);
+            let r52 = r55 + lit(-18.797396);
+            let r55 = r55 + r52;
+            let r52 = r51.mul_add(r52, lit(2.8044958));
+            let r55 = r51.mul_add(r55, r52);
+            let r52 = r51.mul_add(r52, lit(4.5802555));
+            let r55 = r51.mul_add(r55, r52);
+            let r52 = r51.mul_add(r52, lit(0.67946917));
+            let r55 = r51.mul_add(r55, r52);
+            let r55 = r50.mul_add(r53, r55);
+            let r52 = r51.mul_add(r52, lit(0.03459878));
+            let r52 = r50.mul_add(r54, r52);
+            let r54 = r50.mul_add(r56, r54);
+            let r56 = r51 * lit(-0.6919632);
+            let r53 = r56 + lit(21.897259);
+            let r56 = r56 + r53;
+            let r53 = r51.mul_add(r53, lit(14.292728));
+            let r56 = r51.mul_add(r56, r53);
+            let r53 = r51.mul_add(r53, lit(-6.076299));
+            let r56 = r51.mul_add(r56, r53);
+            let r53 = r51.mul_add(r53, lit(3.5632777));
+            let r56 = r51.mul_add(r56, r53);
+            let r53 = r51.mul_add(r53, lit(2.740612));
+            let r56 = r51.mul_add(r56, r53);
+            let r56 = r50.mul_add(r55, r56);
+            let r53 = r51.mul_add(r53, lit(0.123854704));
+            let r53 = r50.mul_add(r52, r53);
+            let r55 = r50 * lit(-0.73189694);
+            let r57 = r51.mul_add(lit(5.5059476), lit(-2.4792378));
+            let r57 = r55 + r57;
+            let r58 = r51 * lit(-15.361438);
+            let r59 = r58 + lit(15.843192);
+            let r58 = r58 + r59;
+            let r58 = r50.mul_add(lit(5.5059476), r58);
+            let r59 = r51.mul_add(r59, lit(-2.9153898));
+            let r59 = r50.mul_add(r57, r59);
+            let r57 = r55 + r57;
+            let r55 = r51 * lit(22.008505);
+            let r60 = r55 + lit(-31.626265);
+            let r55 = r55 + r60;
+            let r60 = r51.mul_add(r60, lit(10.849422));
+            let r55 = r51.mul_add(r55, r60);
+            let r55 = r50.mul_add(r58, r55);
+            let r60 = r51.mul_add(r60, lit(0.022259254));
+            let r60 = r50.mul_add(r59, r60);
+            let r59 = r50.mul_add(r57, r59);
+            let r57 = r51 * lit(-32.95722);
+            let r58 = r57 + lit(47.940353);
+            let r57 = r57 + r58;
+            let r58 = r51.mul_add(r58, lit(-24.777008));
+            let r57 = r51.mul_add(r57, r58);
+            let r58 = r51.mul_add(r58, lit(-7.8058953));
+            let r57 = r51.mul_add(r57, r58);
+            let r57 = r50.mul_add(r55, r57);
+            let r58 = r51.mul_add(r58, lit(3.2521393));
+            let r58 = r50.mul_add(r60, r58);
+            let r60 = r50.mul_add(r59, r60);
+            let r59 = r51 * lit(40.38964);
+            let r55 = r59 + lit(-85.03923);
+            let r59 = r59 + r55;
+            let r55 = r51.mul_add(r55, lit(27.656086));
+            let r59 = r51.mul_add(r59, r55);
+            let r55 = r51.mul_add(r55, lit(-0.31556824));
+            let r59 = r51.mul_add(r59, r55);
+            let r55 = r51.mul_add(r55, lit(-10.776063));
+            let r59 = r51.mul_add(r59, r55);
+            let r59 = r50.mul_add(r57, r59);
+            let r55 = r51.mul_add(r55, lit(2.938116));
+            let r55 = r50.mul_add(r58, r55);
+            let r58 = r50.mul_add(r60, r58);
+            let r60 = r51 * lit(11.477421);
+            let r57 = r60 + lit(-28.036684);
+            let r60 = r60 + r57;
+            let r57 = r51.mul_add(r57, lit(86.54406));
+            let r60 = r51.mul_add(r60, r57);
+            let r57 = r51.mul_add(r57, lit(-38.168766));
+            let r60 = r51.mul_add(r60, r57);
+            let r57 = r51.mul_add(r57, lit(31.440067));
+            let r60 = r51.mul_add(r60, r57);
+            let r57 = r51.mul_add(r57, lit(1.5111662));
+            let r60 = r51.mul_add(r60, r57);
+            let r60 = r50.mul_add(r59, r60);
+            let r57 = r51.mul_add(r57, lit(1.0));
+            let r57 = r50.mul_add(r55, r57);
+            let r57 = unary(Unary::Reciprocal, r57);
+            let r55 = r50.mul_add(r58, r55);
+            let r53 = r53 * r57;
+            let r52 = r50.mul_add(r54, r52);
+            let r56 = (-r53).mul_add(r60, r56);
+            let r52 = (-r53).mul_add(r55, r52);
+            let r56 = r56 * r57;
+            let r56 = lit(1.0526316) * r56;
+            let r57 = r52 * r57;
+            let r49 = r57 * r49;
+            let r56 = lit(2.0).mul_add(r49, r56);
+            let r57 = r53 * r57;
+            let r56 = r53 * r56;
+            let r56 = lit(2.0) * r56;
+            let r53 = (-r53).mul_add(r53, lit(1.0));
+            let r49 = r39 * lit(2.0);
+            let r52 = r45 + r49;
+            let r52 = unary(Unary::Reciprocal, r52);
+            let r49 = lit(1.0) + r49;
+            let r55 = r45 * r49;
+            let r55 = r55 * r52;
+            let r45 = r45 - r55;
+            let r49 = r49 - r55;
+            let r55 = r55.sqrt();
+            let r60 = r24 * lit(4.0);
+            let r45 = r60 * r45;
+            let r24 = r24 * lit(2.0);
+            let r45 = r45 * r52;
+            let r45 = lit(0.5) * r45;
+            let r60 = unary(Unary::Reciprocal, r55);
+            let r45 = r45 * r60;
+            let r55 = lit(1.0) - r55;
+            let r54 = r55 * lit(-51.966053);
+            let r50 = r51.mul_add(lit(-570.10706), lit(294.6542));
+            let r50 = r54 + r50;
+            let r58 = r51 * lit(-1151.2646);
+            let r59 = r58 + lit(2261.705);
+            let r58 = r58 + r59;
+            let r58 = r55.mul_add(lit(-570.10706), r58);
+            let r59 = r51.mul_add(r59, lit(-958.72577));
+            let r59 = r55.mul_add(r50, r59);
+            let r50 = r54 + r50;
+            let r54 = r51 * lit(3107.8694);
+            let r61 = r54 + lit(771.69995);
+            let r54 = r54 + r61;
+            let r61 = r51.mul_add(r61, lit(-3104.6565));
+            let r54 = r51.mul_add(r54, r61);
+            let r54 = r55.mul_add(r58, r54);
+            let r61 = r51.mul_add(r61, lit(1684.868));
+            let r61 = r55.mul_add(r59, r61);
+            let r59 = r55.mul_add(r50, r59);
+            let r50 = r51 * lit(-2028.784);
+            let r58 = r50 + lit(-2819.9106);
+            let r50 = r50 + r58;
+            let r58 = r51.mul_add(r58, lit(-853.38617));
+            let r50 = r51.mul_add(r50, r58);
+            let r58 = r51.mul_add(r58, lit(2724.646));
+            let r50 = r51.mul_add(r50, r58);
+            let r50 = r55.mul_add(r54, r50);
+            let r58 = r51.mul_add(r58, lit(-1027.6843));
+            let r58 = r55.mul_add(r61, r58);
+            let r61 = r55.mul_add(r59, r61);
+            let r59 = r51 * lit(-78.26518);
+            let r54 = r59 + lit(1147.8971);
+            let r59 = r59 + r54;
+            let r54 = r51.mul_add(r54, lit(1380.4232));
+            let r59 = r51.mul_add(r59, r54);
+            let r54 = r51.mul_add(r54, lit(99.29577));
+            let r59 = r51.mul_add(r59, r54);
+            let r54 = r51.mul_add(r54, lit(-341.66718));
+            let r59 = r51.mul_add(r59, r54);
+            let r59 = r55.mul_add(r50, r59);
+            let r54 = r51.mul_add(r54, lit(402.98117));
+            let r54 = r55.mul_add(r58, r54);
+            let r58 = r55.mul_add(r61, r58);
+            let r61 = r51 * lit(99.87072);
+            let r50 = r61 + lit(403.23367);
+            let r61 = r61 + r50;
+            let r50 = r51.mul_add(r50, lit(-329.77115));
+            let r61 = r51.mul_add(r61, r50);
+            let r50 = r51.mul_add(r50, lit(204.95244));
+            let r61 = r51.mul_add(r61, r50);
+            let r50 = r51.mul_add(r50, lit(-16.22698));
+            let r61 = r51.mul_add(r61, r50);
+            let r50 = r51.mul_add(r50, lit(0.36739597));
+            let r61 = r51.mul_add(r61, r50);
+            let r61 = r55.mul_add(r59, r61);
+            let r50 = r51.mul_add(r50, lit(-0.0013912567));
+            let r50 = r55.mul_add(r54, r50);
+            let r59 = r55 * lit(-52.70797);
+            let r62 = r51.mul_add(lit(-754.39386), lit(291.25507));
+            let r62 = r59 + r62;
+            let r63 = r51 * lit(-1056.3835);
+            let r64 = r63 + lit(2750.1265);
             let r63 = r63 + r64;
-            let r64 = r53.mul_add(r64, lit(1070.8275));
-            let r63 = r53.mul_add(r63, r64);
-            let r64 = r53.mul_add(r64, lit(3149.3064));
-            let r63 = r53.mul_add(r63, r64);
-            let r63 = r57.mul_add(r60, r63);
-            let r64 = r53.mul_add(r64, lit(-1016.11487));
-            let r64 = r57.mul_add(r66, r64);
-            let r66 = r57.mul_add(r65, r66);
-            let r65 = r53 * lit(-2368.5022);
-            let r60 = r65 + lit(488.391);
-            let r65 = r65 + r60;
-            let r60 = r53.mul_add(r60, lit(4104.414));
-            let r65 = r53.mul_add(r65, r60);
-            let r60 = r53.mul_add(r60, lit(-850.04376));
-            let r65 = r53.mul_add(r65, r60);
-            let r60 = r53.mul_add(r60, lit(-487.51877));
-            let r65 = r53.mul_add(r65, r60);
-            let r65 = r57.mul_add(r63, r65);
-            let r60 = r53.mul_add(r60, lit(399.00104));
-            let r60 = r57.mul_add(r64, r60);
-            let r64 = r57.mul_add(r66, r64);
-            let r66 = r53 * lit(655.7609);
-            let r63 = r66 + lit(1343.5812);
-            let r66 = r66 + r63;
-            let r63 = r53.mul_add(r63, lit(-120.513466));
-            let r66 = r53.mul_add(r66, r63);
-            let r63 = r53.mul_add(r63, lit(-241.4999));
-            let r66 = r53.mul_add(r66, r63);
-            let r63 = r53.mul_add(r63, lit(299.9503));
-            let r66 = r53.mul_add(r66, r63);
-            let r63 = r53.mul_add(r63, lit(37.510433));
-            let r66 = r53.mul_add(r66, r63);
-            let r66 = r57.mul_add(r65, r66);
-            let r63 = r53.mul_add(r63, lit(1.0));
-            let r63 = r57.mul_add(r60, r63);
-            let r63 = unary(Unary::Reciprocal, r63);
-            let r60 = r57.mul_add(r64, r60);
-            let r56 = r56 * r63;
-            let r62 = r57.mul_add(r52, r62);
-            let r61 = (-r56).mul_add(r66, r61);
-            let r62 = (-r56).mul_add(r60, r62);
-            let r61 = r61 * r63;
+            let r63 = r55.mul_add(lit(-754.39386), r63);
+            let r64 = r51.mul_add(r64, lit(-946.7237));
+            let r64 = r55.mul_add(r62, r64);
+            let r62 = r59 + r62;
+            let r59 = r51 * lit(3827.2642);
+            let r65 = r59 + lit(383.2556);
+            let r59 = r59 + r65;
+            let r65 = r51.mul_add(r65, lit(-3586.956));
+            let r59 = r51.mul_add(r59, r65);
+            let r59 = r55.mul_add(r63, r59);
+            let r65 = r51.mul_add(r65, lit(1672.4937));
+            let r65 = r55.mul_add(r64, r65);
+            let r64 = r55.mul_add(r62, r64);
+            let r62 = r51 * lit(-290.88354);
+            let r63 = r62 + lit(-6400.9927);
+            let r62 = r62 + r63;
+            let r63 = r51.mul_add(r63, lit(1070.8275));
+            let r62 = r51.mul_add(r62, r63);
+            let r63 = r51.mul_add(r63, lit(3149.3064));
+            let r62 = r51.mul_add(r62, r63);
+            let r62 = r55.mul_add(r59, r62);
+            let r63 = r51.mul_add(r63, lit(-1016.11487));
+            let r63 = r55.mul_add(r65, r63);
+            let r65 = r55.mul_add(r64, r65);
+            let r64 = r51 * lit(-2368.5022);
+            let r59 = r64 + lit(488.391);
+            let r64 = r64 + r59;
+            let r59 = r51.mul_add(r59, lit(4104.414));
+            let r64 = r51.mul_add(r64, r59);
+            let r59 = r51.mul_add(r59, lit(-850.04376));
+            let r64 = r51.mul_add(r64, r59);
+            let r59 = r51.mul_add(r59, lit(-487.51877));
+            let r64 = r51.mul_add(r64, r59);
+            let r64 = r55.mul_add(r62, r64);
+            let r59 = r51.mul_add(r59, lit(399.00104));
+            let r59 = r55.mul_add(r63, r59);
+            let r63 = r55.mul_add(r65, r63);
+            let r65 = r51 * lit(655.7609);
+            let r62 = r65 + lit(1343.5812);
+            let r65 = r65 + r62;
+            let r62 = r51.mul_add(r62, lit(-120.513466));
+            let r65 = r51.mul_add(r65, r62);
+            let r62 = r51.mul_add(r62, lit(-241.4999));
+            let r65 = r51.mul_add(r65, r62);
+            let r62 = r51.mul_add(r62, lit(299.9503));
+            let r65 = r51.mul_add(r65, r62);
+            let r62 = r51.mul_add(r62, lit(37.510433));
+            let r65 = r51.mul_add(r65, r62);
+            let r65 = r55.mul_add(r64, r65);
+            let r62 = r51.mul_add(r62, lit(1.0));
+            let r62 = r55.mul_add(r59, r62);
+            let r62 = unary(Unary::Reciprocal, r62);
+            let r59 = r55.mul_add(r63, r59);
+            let r50 = r50 * r62;
+            let r54 = r55.mul_add(r58, r54);
+            let r61 = (-r50).mul_add(r65, r61);
+            let r54 = (-r50).mul_add(r59, r54);
+            let r61 = r61 * r62;
             let r61 = lit(1.0526316) * r61;
-            let r63 = r62 * r63;
-            let r61 = (-r63).mul_add(r47, r61);
-            let r61 = select(lit(0.0).lt(r56), r61, lit(0.0));
-            let r47 = lit(0.0).max(r56);
-            let r62 = r47 * r47;
-            let r60 = r62 * r62;
-            let r66 = r47 * r60;
-            let r52 = lit(1.0) - r66;
-            let r52 = r55 * r52;
-            let r57 = r47 * r55;
-            let r57 = r60 * r57;
-            let r64 = r36.mul_add(u(131), u(132));
-            let r53 = r64 * r52;
-            let r57 = u(133).mul_add(r53, r57);
-            let r39 = r57 * r39;
-            let r53 = r57 * u(134);
-            let r65 = lit(1.0).min(r53);
-            let r65 = (-r65).mul_add(u(135), lit(1.0));
-            let r67 = select(r53.lt(lit(1.0)), r57, lit(0.0));
-            let r53 = select(r53.lt(lit(1.0)), u(134), lit(0.0));
-            let r68 = r38.mul_add(u(136), u(137));
-            let r67 = r68 * r67;
-            let r69 = r12 * u(138);
-            let r69 = r13.mul_add(u(139), r69);
-            let r69 = r14.mul_add(u(140), r69);
-            let r70 = r12 * u(141);
-            let r70 = r13.mul_add(u(142), r70);
-            let r70 = r14.mul_add(u(143), r70);
-            let r71 = r12 * u(144);
-            let r71 = r13.mul_add(u(145), r71);
-            let r71 = r14.mul_add(u(146), r71);
-            let r72 = samples(12);
-            let r73 = lit(0.0).max(r71);
-            let r74 = samples(13);
-            let r75 = lit(0.0).max(r70);
-            let r76 = r72 * r73;
-            let r77 = r74 * r75;
-            let r78 = r76 * u(147);
-            let r79 = r77 * u(148);
-            let r80 = -r78;
-            let r80 = r80 - r79;
-            let r81 = samples(14);
-            let r82 = lit(0.0).max(r69);
-            let r83 = r81 * r82;
-            let r84 = r83 * u(149);
-            let r80 = r80 - r84;
-            let r85 = r76 * u(150);
-            let r86 = r77 * u(151);
-            let r87 = -r85;
-            let r87 = r87 - r86;
-            let r88 = r83 * u(152);
-            let r87 = r87 - r88;
-            let r89 = r76 * u(153);
-            let r89 = r77.mul_add(u(154), r89);
-            let r89 = r83.mul_add(u(155), r89);
-            let r90 = r12 * u(156);
-            let r90 = r13.mul_add(u(157), r90);
-            let r90 = r14.mul_add(u(158), r90);
-            let r91 = samples(15);
-            let r92 = lit(0.0).max(r90);
-            let r93 = r91 * r92;
-            let r94 = r93 * u(159);
-            let r80 = r80 - r94;
-            let r95 = r93 * u(160);
-            let r87 = r87 - r95;
+            let r62 = r54 * r62;
+            let r61 = (-r62).mul_add(r45, r61);
+            let r61 = select(lit(0.0).lt(r50), r61, lit(0.0));
+            let r45 = lit(0.0).max(r50);
+            let r54 = r45 * r45;
+            let r59 = r54 * r54;
+            let r65 = r45 * r59;
+            let r58 = lit(1.0) - r65;
+            let r58 = r53 * r58;
+            let r55 = r45 * r53;
+            let r55 = r59 * r55;
+            let r63 = r36.mul_add(u(143), u(144));
+            let r51 = r63 * r58;
+            let r55 = u(145).mul_add(r51, r55);
+            let r51 = r55 * u(146);
+            let r64 = lit(1.0).min(r51);
+            let r64 = (-r64).mul_add(u(147), lit(1.0));
+            let r66 = select(r51.lt(lit(1.0)), r55, lit(0.0));
+            let r51 = select(r51.lt(lit(1.0)), u(146), lit(0.0));
+            let r67 = r38.mul_add(u(148), u(149));
+            let r66 = r67 * r66;
             let point = CubePoint::of_unit([r12, r13, r14]);
-            let [r96, r97, r98] = point.place();
-            let [r99, r100] = point.tangent([r15, r16, r17]);
-            let r101 = kept(0);
+            let [r68, r69, r70] = point.place();
+            let [r71, r72] = point.tangent([r15, r16, r17]);
+            let r73 = kept(0);
             let cube = cubes[0];
-            let at = cube.footprint_at(r96, r97, r98);
-            let ([r102, r103, r104, _], [r105, r106, r107, _]) = cube.sample_with_slope(&at, cube.texels([r99, r100]));
-            let r102 = r101 * r102;
-            let r100 = r93 * u(161);
-            let r99 = r89 + r100;
-            let r99 = r99 + r102;
-            let r89 = r89 + r102;
-            let r89 = r100 + r89;
-            let r100 = r65 * r68;
-            let r99 = r100 * r99;
-            let r100 = samples(17);
-            let r98 = samples(18);
-            let r97 = samples(19);
-            let unit = Unit::new([r100, r98, r97]);
-            let [mut r96, mut r108, mut r109] = unit.direction;
-            let r110 = unit.has_direction;
+            let at = cube.footprint_at(r68, r69, r70);
+            let ([r74, r75, r76, _], [r77, r78, r79, _]) = cube.sample_with_slope(&at, cube.texels([r71, r72]));
+            let r74 = r73 * r74;
+            let r77 = r73 * r77;
+            let r73 = u(145) * r63;
+            let r72 = select(r73.lt(lit(1.0)), r73, lit(0.0));
+            let r71 = r72.max(lit(1e-24));
+            let r71 = r71.sqrt();
+            let r70 = lit(1.0) - r71;
+            let r69 = r70 * r70;
+            let r69 = unary(Unary::Reciprocal, r69);
+            let r68 = r71 * lit(4.0);
+            let r68 = r68 * r69;
+            let r80 = samples(17);
+            let r81 = samples(18);
+            let r82 = samples(19);
+            let unit = Unit::new([r80, r81, r82]);
+            let [mut r83, mut r84, mut r85] = unit.direction;
+            let r86 = unit.has_direction;
             if !unit.all {
-                r96 = select(r110, r96, r12);
-                r108 = select(r110, r108, r13);
-                r109 = select(r110, r109, r14);
+                r83 = select(r86, r83, r12);
+                r84 = select(r86, r84, r13);
+                r85 = select(r86, r85, r14);
             }
             let unit = Unit::new([r4, r18, r2]);
-            let [mut r110, mut r111, mut r112] = unit.direction;
-            let r113 = unit.has_direction;
+            let [mut r86, mut r87, mut r88] = unit.direction;
+            let r89 = unit.has_direction;
             if !unit.all {
-                r110 = select(r113, r110, r12);
-                r111 = select(r113, r111, r13);
-                r112 = select(r113, r112, r14);
+                r86 = select(r89, r86, r12);
+                r87 = select(r89, r87, r13);
+                r88 = select(r89, r88, r14);
             }
-            let r113 = r96 * r110;
-            let r113 = r108.mul_add(r111, r113);
-            let r113 = r109.mul_add(r112, r113);
-            let r114 = r113.abs();
-            let r115 = lit(0.999999).min(r114);
-            let r116 = lit(1.0) - r115;
-            let r116 = r116.sqrt();
-            let r117 = r115 * lit(0.0187293);
-            let r118 = lit(0.074261) - r117;
-            let r117 = r118 - r117;
-            let r118 = r115.mul_add(r118, lit(-0.2121144));
-            let r119 = r115.mul_add(r118, lit(1.5707288));
-            let r120 = r119 * r116;
-            let r121 = lit(3.141592653589793) - r120;
-            let r121 = select(r113.ge(lit(0.0)), r120, r121);
-            let r120 = kept(3);
-            let r44 = select(r42.lt(r120), lit(0.0), r44);
-            let r122 = r120.abs();
-            let r122 = lit(0.999999).min(r122);
-            let r123 = (-lit(0.0187293)).mul_add(r122, lit(0.074261));
-            let r123 = r122.mul_add(r123, lit(-0.2121144));
-            let r123 = r122.mul_add(r123, lit(1.5707288));
-            let r122 = lit(1.0) - r122;
-            let r122 = r122.sqrt();
-            let r122 = r123 * r122;
-            let r123 = lit(3.141592653589793) - r122;
-            let r123 = select(r120.ge(lit(0.0)), r122, r123);
-            let r120 = r120.max(r42);
-            let r120 = lit(1.0) - r120;
-            let r122 = r42.abs();
-            let r46 = select(r122.lt(lit(0.999999)), r46, lit(0.0));
-            let r122 = lit(0.999999).min(r122);
-            let r124 = lit(0.0187293) * r122;
-            let r125 = lit(0.074261) - r124;
-            let r124 = r125 - r124;
-            let r124 = r46 * r124;
-            let r125 = r122.mul_add(r125, lit(-0.2121144));
-            let r126 = r125 * r46;
-            let r126 = r122.mul_add(r124, r126);
-            let r125 = r122.mul_add(r125, lit(1.5707288));
-            let r46 = lit(0.5) * r46;
-            let r122 = lit(1.0) - r122;
-            let r122 = r122.sqrt();
-            let r126 = r122 * r126;
-            let r46 = r46 / r122;
-            let r46 = r125 * r46;
-            let r122 = r125 * r122;
-            let r125 = r46 - r126;
-            let r46 = r126 - r46;
-            let r125 = select(r42.ge(lit(0.0)), r46, r125);
-            let r46 = lit(3.141592653589793) - r122;
-            let r46 = select(r42.ge(lit(0.0)), r122, r46);
-            let r122 = r123 - r46;
-            let r46 = r123 + r46;
-            let r123 = binary(Binary::Less, lit(0.0), r122);
-            let r126 = binary(Binary::Less, r122, lit(0.0));
-            let r126 = r123 - r126;
-            let r122 = r122.abs();
-            let r121 = r121 - r122;
-            let r122 = r46 - r122;
-            let r46 = lit(1.0) + r126;
-            let r46 = r125 * r46;
-            let r126 = r125 * r126;
-            let r46 = select(lit(0.0001).lt(r122), r46, lit(0.0));
-            let r122 = r122.max(lit(0.0001));
-            let r122 = unary(Unary::Reciprocal, r122);
-            let r121 = r121 * r122;
-            let r126 = (-r121).mul_add(r46, r126);
-            let r126 = r126 * r122;
-            let r121 = lit(1.0) - r121;
-            let r126 = -r126;
-            let r126 = select(lit(0.0).lt(r121), r126, lit(0.0));
-            let r46 = lit(0.0).max(r121);
-            let r126 = select(r46.lt(lit(1.0)), r126, lit(0.0));
-            let r125 = lit(1.0).min(r46);
-            let r123 = r125 * r126;
-            let r123 = lit(2.0) * r123;
-            let r124 = r125 * r125;
-            let r126 = r124 * r126;
-            let r127 = (-lit(2.0)).mul_add(r125, lit(3.0));
-            let r123 = r127 * r123;
-            let r123 = (-lit(2.0)).mul_add(r126, r123);
-            let r123 = r120 * r123;
-            let r126 = r124 * r127;
-            let r123 = (-r126).mul_add(r44, r123);
-            let r126 = r126 * r120;
-            let r44 = lit(1.0) - r42;
-            let r44 = unary(Unary::Reciprocal, r44);
-            let r126 = r126 * r44;
-            let r42 = r42 * r126;
-            let r42 = r43 * r42;
-            let r123 = lit(0.6931471805599453).mul_add(r42, r123);
-            let r123 = r123 * r44;
-            let r39 = r123 * r39;
+            let r89 = r83 * r86;
+            let r89 = r84.mul_add(r87, r89);
+            let r89 = r85.mul_add(r88, r89);
+            let r90 = r89.abs();
+            let r91 = lit(0.999999).min(r90);
+            let r92 = lit(1.0) - r91;
+            let r92 = r92.sqrt();
+            let r93 = r91 * lit(0.0187293);
+            let r94 = lit(0.074261) - r93;
+            let r93 = r94 - r93;
+            let r94 = r91.mul_add(r94, lit(-0.2121144));
+            let r95 = r91.mul_add(r94, lit(1.5707288));
+            let r96 = r95 * r92;
+            let r97 = lit(3.141592653589793) - r96;
+            let r97 = select(r89.ge(lit(0.0)), r96, r97);
+            let r96 = kept(3);
+            let r42 = select(r40.lt(r96), lit(0.0), r42);
+            let r98 = r96.abs();
+            let r98 = lit(0.999999).min(r98);
+            let r99 = (-lit(0.0187293)).mul_add(r98, lit(0.074261));
+            let r99 = r98.mul_add(r99, lit(-0.2121144));
+            let r99 = r98.mul_add(r99, lit(1.5707288));
+            let r98 = lit(1.0) - r98;
+            let r98 = r98.sqrt();
+            let r98 = r99 * r98;
+            let r99 = lit(3.141592653589793) - r98;
+            let r99 = select(r96.ge(lit(0.0)), r98, r99);
+            let r96 = r96.max(r40);
+            let r96 = lit(1.0) - r96;
+            let r98 = r40.abs();
+            let r44 = select(r98.lt(lit(0.999999)), r44, lit(0.0));
+            let r98 = lit(0.999999).min(r98);
+            let r100 = lit(0.0187293) * r98;
+            let r101 = lit(0.074261) - r100;
+            let r100 = r101 - r100;
+            let r100 = r44 * r100;
+            let r101 = r98.mul_add(r101, lit(-0.2121144));
+            let r102 = r101 * r44;
+            let r102 = r98.mul_add(r100, r102);
+            let r101 = r98.mul_add(r101, lit(1.5707288));
+            let r44 = lit(0.5) * r44;
+            let r98 = lit(1.0) - r98;
+            let r98 = r98.sqrt();
+            let r102 = r98 * r102;
+            let r44 = r44 / r98;
+            let r44 = r101 * r44;
+            let r98 = r101 * r98;
+            let r101 = r44 - r102;
+            let r44 = r102 - r44;
+            let r101 = select(r40.ge(lit(0.0)), r44, r101);
+            let r44 = lit(3.141592653589793) - r98;
+            let r44 = select(r40.ge(lit(0.0)), r98, r44);
+            let r98 = r99 - r44;
+            let r44 = r99 + r44;
+            let r99 = binary(Binary::Less, lit(0.0), r98);
+            let r102 = binary(Binary::Less, r98, lit(0.0));
+            let r102 = r99 - r102;
+            let r98 = r98.abs();
+            let r97 = r97 - r98;
+            let r98 = r44 - r98;
+            let r44 = lit(1.0) + r102;
+            let r44 = r101 * r44;
+            let r102 = r101 * r102;
+            let r44 = select(lit(0.0001).lt(r98), r44, lit(0.0));
+            let r98 = r98.max(lit(0.0001));
+            let r98 = unary(Unary::Reciprocal, r98);
+            let r97 = r97 * r98;
+            let r102 = (-r97).mul_add(r44, r102);
+            let r102 = r102 * r98;
+            let r97 = lit(1.0) - r97;
+            let r102 = -r102;
+            let r102 = select(lit(0.0).lt(r97), r102, lit(0.0));
+            let r44 = lit(0.0).max(r97);
+            let r102 = select(r44.lt(lit(1.0)), r102, lit(0.0));
+            let r101 = lit(1.0).min(r44);
+            let r99 = r101 * r102;
+            let r99 = lit(2.0) * r99;
+            let r100 = r101 * r101;
+            let r102 = r100 * r102;
+            let r103 = (-lit(2.0)).mul_add(r101, lit(3.0));
+            let r99 = r103 * r99;
+            let r99 = (-lit(2.0)).mul_add(r102, r99);
+            let r99 = r96 * r99;
+            let r102 = r100 * r103;
+            let r99 = (-r102).mul_add(r42, r99);
+            let r102 = r102 * r96;
+            let r42 = lit(1.0) - r40;
+            let r42 = unary(Unary::Reciprocal, r42);
+            let r102 = r102 * r42;
+            let r40 = r40 * r102;
+            let r40 = r41 * r40;
+            let r99 = lit(0.6931471805599453).mul_add(r40, r99);
+            let r99 = r99 * r42;
             let cube = cubes[2];
-            let at = texels575;
-            let ([r123, r42, r43, _], [r128, r129, r130, _]) = cube.sample_with_slope(&at, cube.texels([r31, r32]));
+            let at = texels530;
+            let ([r40, r41, r104, _], [r105, r106, r107, _]) = cube.sample_with_slope(&at, cube.texels([r31, r32]));
             let cube = cubes[1];
-            let at = texels576;
-            let ([r131, r132, r133, _], [r134, r135, r136, _]) = cube.sample_with_slope(&at, cube.texels([r31, r32]));
-            let r129 = r129 - r135;
-            let r130 = r130 - r136;
-            let r123 = r123 - r131;
-            let r42 = r42 - r132;
-            let r43 = r43 - r133;
-            let r128 = r128 - r134;
-            let r135 = r36.mul_add(r129, r135);
-            let r136 = r36.mul_add(r130, r136);
-            let r131 = r36.mul_add(r123, r131);
-            let r132 = r36.mul_add(r42, r132);
-            let r133 = r36.mul_add(r43, r133);
-            let r43 = samples(21);
-            let r42 = lit(1.0) - r126;
-            let r123 = r126 * r131;
-            let r123 = r43.mul_add(r42, r123);
-            let r130 = r52 * r123;
-            let r130 = r64 * r130;
-            let r123 = r57 * r123;
-            let r129 = u(156) - r9;
-            let r32 = u(157) - r10;
-            let r31 = r129 * r129;
-            let r31 = r32.mul_add(r32, r31);
-            let r30 = u(158) - r11;
-            let r31 = r30.mul_add(r30, r31);
-            let r29 = binary(Binary::Less, lit(0.0), r0);
-            let r28 = select(lit(0.0).lt(r90), r29, lit(0.0));
-            let r137 = binary(Binary::Less, lit(1e-12), r31);
-            let r137 = select(r28.ge(lit(0.5)), r137, lit(0.0));
-            let r31 = select(r137.ge(lit(0.5)), r31, lit(1.0));
-            let r28 = u(133) * r64;
-            let r138 = select(r28.lt(lit(1.0)), r64, lit(0.0));
-            let r139 = select(r28.lt(lit(1.0)), r28, lit(0.0));
-            let r140 = select(lit(1e-24).lt(r139), r138, lit(0.0));
-            let r140 = lit(0.5) * r140;
-            let r138 = lit(8.0) * r138;
-            let r141 = r139.max(lit(1e-24));
-            let r141 = r141.sqrt();
-            let r139 = r139 * lit(8.0);
-            let r140 = r140 / r141;
-            let r142 = lit(1.0) - r141;
-            let r141 = r141 * lit(4.0);
-            let r143 = r142 * r140;
-            let r143 = r143 * lit(-2.0);
-            let r144 = r31.sqrt();
-            let r144 = lit(0.5) * r144;
-            let r31 = unary(Unary::Reciprocal, r31);
-            let r144 = select(r137.ge(lit(0.5)), r144, lit(1.0));
-            let r145 = r142 * r142;
-            let r145 = unary(Unary::Reciprocal, r145);
-            let r141 = r141 * r145;
-            let r146 = lit(4.0) * r140;
-            let r146 = (-r141).mul_add(r143, r146);
-            let r145 = r146 * r145;
-            let r146 = r144.mul_add(r144, r141);
-            let r146 = r146.sqrt();
-            let r143 = lit(0.5) * r145;
-            let r147 = r144 + r146;
-            let r146 = r143 / r146;
-            let r146 = select(lit(0.1).lt(r147), r146, lit(0.0));
-            let r147 = lit(0.1).max(r147);
-            let r148 = r142 * r146;
-            let r148 = (-r147).mul_add(r140, r148);
-            let r149 = r142 * r147;
-            let r148 = r149 * r148;
-            let r148 = lit(2.0) * r148;
-            let r149 = r149 * r149;
-            let r148 = r149 * r148;
-            let r148 = lit(2.0) * r148;
-            let r149 = r149 * r149;
-            let r149 = unary(Unary::Reciprocal, r149);
-            let r150 = r139 * r149;
-            let r148 = (-r150).mul_add(r148, r138);
-            let r149 = r148 * r149;
-            let r148 = r144 * r147;
-            let r148 = r148 - lit(1.0);
-            let r147 = unary(Unary::Reciprocal, r147);
-            let r151 = r141 * r147;
-            let r152 = (-r151).mul_add(r146, r145);
-            let r147 = r152 * r147;
-            let r151 = r144.mul_add(r151, lit(1.0));
-            let r151 = unary(Unary::Reciprocal, r151);
-            let r148 = r148 * r151;
-            let r146 = (-r148).mul_add(r147, r146);
-            let r146 = r144 * r146;
-            let r151 = r146 * r151;
-            let r151 = r148 * r151;
-            let r151 = lit(2.0) * r151;
-            let r148 = r148.mul_add(r148, lit(1.0));
-            let r149 = r148 * r149;
-            let r149 = r150.mul_add(r151, r149);
-            let r149 = select(r28.lt(lit(1.0)), r149, lit(0.0));
-            let r148 = r150 * r148;
-            let r148 = select(r28.lt(lit(1.0)), r148, lit(1.0));
-            let r150 = r12 * r129;
-            let r150 = r13.mul_add(r32, r150);
-            let r150 = r14.mul_add(r30, r150);
-            let r151 = r12 * r32;
-            let r151 = (-r13).mul_add(r129, r151);
-            let r146 = r14 * r129;
-            let r146 = (-r12).mul_add(r30, r146);
-            let r144 = r13 * r30;
-            let r144 = (-r14).mul_add(r32, r144);
-            let r147 = r144 * r144;
-            let r147 = r146.mul_add(r146, r147);
-            let r147 = r151.mul_add(r151, r147);
-            let r152 = r150 * r150;
-            let r147 = r40.mul_add(r152, r147);
-            let r152 = r152 * r41;
-            let r147 = r147 * r31;
-            let r152 = r152 * r31;
-            let r147 = select(r137.ge(lit(0.5)), r147, lit(1.0));
-            let r152 = select(r137.ge(lit(0.5)), r152, lit(0.0));
-            let r152 = r147 * r152;
-            let r152 = lit(6.283185307179586) * r152;
-            let r153 = lit(3.141592653589793) * r147;
-            let r153 = r147 * r153;
-            let r153 = unary(Unary::Reciprocal, r153);
-            let r154 = r40 * r153;
-            let r152 = (-r154).mul_add(r152, r41);
-            let r152 = r152 * r153;
-            let r155 = select(r137.ge(lit(0.5)), r0, lit(1.0));
-            let r156 = r155 * r155;
-            let r157 = lit(1.0) - r156;
-            let r157 = r41 * r157;
-            let r157 = lit(0.5) * r157;
-            let r158 = lit(1.0) - r40;
-            let r156 = r158.mul_add(r156, r40);
-            let r156 = r156.sqrt();
-            let r159 = select(r137.ge(lit(0.5)), r90, lit(1.0));
-            let r160 = r159 * r159;
-            let r161 = lit(1.0) - r160;
-            let r161 = r41 * r161;
-            let r160 = r158.mul_add(r160, r40);
-            let r161 = lit(0.5) * r161;
-            let r160 = r160.sqrt();
-            let r162 = r155 * r160;
-            let r162 = r159.mul_add(r156, r162);
-            let r163 = lit(1e-6).max(r162);
-            let r163 = unary(Unary::Reciprocal, r163);
-            let r164 = lit(0.5) * r163;
-            let r152 = r164 * r152;
-            let r165 = r154 * r164;
-            let r149 = r165 * r149;
-            let r149 = select(r137.ge(lit(0.5)), r149, lit(0.0));
-            let r165 = r148 * r165;
-            let r149 = r92 * r149;
-            let r165 = select(r137.ge(lit(0.5)), r165, lit(0.0));
-            let r149 = r91 * r149;
-            let r166 = r92 * r165;
-            let r166 = r91 * r166;
-            let r167 = u(138) - r9;
-            let r168 = u(139) - r10;
-            let r169 = r167 * r167;
-            let r169 = r168.mul_add(r168, r169);
-            let r170 = u(140) - r11;
-            let r169 = r170.mul_add(r170, r169);
-            let r171 = select(lit(0.0).lt(r69), r29, lit(0.0));
-            let r172 = binary(Binary::Less, lit(1e-12), r169);
-            let r172 = select(r171.ge(lit(0.5)), r172, lit(0.0));
-            let r169 = select(r172.ge(lit(0.5)), r169, lit(1.0));
-            let r171 = r169.sqrt();
-            let r171 = lit(0.5) * r171;
-            let r169 = unary(Unary::Reciprocal, r169);
-            let r171 = select(r172.ge(lit(0.5)), r171, lit(1.0));
-            let r173 = r171.mul_add(r171, r141);
-            let r173 = r173.sqrt();
-            let r174 = r171 + r173;
-            let r173 = r143 / r173;
-            let r173 = select(lit(0.1).lt(r174), r173, lit(0.0));
-            let r174 = lit(0.1).max(r174);
-            let r175 = r142 * r173;
-            let r175 = (-r174).mul_add(r140, r175);
-            let r176 = r142 * r174;
-            let r175 = r176 * r175;
-            let r175 = lit(2.0) * r175;
-            let r176 = r176 * r176;
-            let r175 = r176 * r175;
-            let r175 = lit(2.0) * r175;
-            let r176 = r176 * r176;
-            let r176 = unary(Unary::Reciprocal, r176);
-            let r177 = r139 * r176;
-            let r175 = (-r177).mul_add(r175, r138);
-            let r176 = r175 * r176;
-            let r175 = r171 * r174;
-            let r175 = r175 - lit(1.0);
-            let r174 = unary(Unary::Reciprocal, r174);
-            let r178 = r141 * r174;
-            let r179 = (-r178).mul_add(r173, r145);
-            let r174 = r179 * r174;
-            let r178 = r171.mul_add(r178, lit(1.0));
-            let r178 = unary(Unary::Reciprocal, r178);
-            let r175 = r175 * r178;
-            let r173 = (-r175).mul_add(r174, r173);
-            let r173 = r171 * r173;
-            let r178 = r173 * r178;
-            let r178 = r175 * r178;
-            let r178 = lit(2.0) * r178;
-            let r175 = r175.mul_add(r175, lit(1.0));
-            let r176 = r175 * r176;
-            let r176 = r177.mul_add(r178, r176);
-            let r176 = select(r28.lt(lit(1.0)), r176, lit(0.0));
-            let r175 = r177 * r175;
-            let r175 = select(r28.lt(lit(1.0)), r175, lit(1.0));
-            let r177 = r12 * r167;
-            let r177 = r13.mul_add(r168, r177);
-            let r177 = r14.mul_add(r170, r177);
-            let r178 = r12 * r168;
-            let r178 = (-r13).mul_add(r167, r178);
-            let r173 = r14 * r167;
-            let r173 = (-r12).mul_add(r170, r173);
-            let r171 = r13 * r170;
-            let r171 = (-r14).mul_add(r168, r171);
-            let r174 = r171 * r171;
-            let r174 = r173.mul_add(r173, r174);
-            let r174 = r178.mul_add(r178, r174);
-            let r179 = r177 * r177;
-            let r174 = r40.mul_add(r179, r174);
-            let r179 = r179 * r41;
-            let r174 = r174 * r169;
-            let r179 = r179 * r169;
-            let r174 = select(r172.ge(lit(0.5)), r174, lit(1.0));
-            let r179 = select(r172.ge(lit(0.5)), r179, lit(0.0));
-            let r179 = r174 * r179;
-            let r179 = lit(6.283185307179586) * r179;
-            let r180 = lit(3.141592653589793) * r174;
-            let r180 = r174 * r180;
-            let r180 = unary(Unary::Reciprocal, r180);
-            let r181 = r40 * r180;
-            let r179 = (-r181).mul_add(r179, r41);
-            let r179 = r179 * r180;
-            let r182 = select(r172.ge(lit(0.5)), r0, lit(1.0));
-            let r183 = r182 * r182;
-            let r184 = lit(1.0) - r183;
-            let r184 = r41 * r184;
-            let r183 = r158.mul_add(r183, r40);
-            let r184 = lit(0.5) * r184;
-            let r183 = r183.sqrt();
-            let r185 = select(r172.ge(lit(0.5)), r69, lit(1.0));
-            let r186 = r185 * r185;
-            let r187 = lit(1.0) - r186;
-            let r187 = r41 * r187;
-            let r186 = r158.mul_add(r186, r40);
-            let r187 = lit(0.5) * r187;
-            let r186 = r186.sqrt();
-            let r188 = r182 * r186;
-            let r188 = r185.mul_add(r183, r188);
-            let r189 = lit(1e-6).max(r188);
-            let r189 = unary(Unary::Reciprocal, r189);
-            let r190 = lit(0.5) * r189;
-            let r179 = r190 * r179;
-            let r191 = r181 * r190;
-            let r176 = r191 * r176;
-            let r176 = select(r172.ge(lit(0.5)), r176, lit(0.0));
-            let r191 = r175 * r191;
-            let r176 = r82 * r176;
-            let r191 = select(r172.ge(lit(0.5)), r191, lit(0.0));
-            let r176 = r81 * r176;
-            let r192 = r82 * r191;
-            let r192 = r81 * r192;
-            let r193 = u(141) - r9;
-            let r9 = u(144) - r9;
-            let r194 = u(142) - r10;
-            let r10 = u(145) - r10;
-            let r195 = r193 * r193;
-            let r195 = r194.mul_add(r194, r195);
-            let r196 = u(143) - r11;
-            let r195 = r196.mul_add(r196, r195);
-            let r11 = u(146) - r11;
-            let r197 = select(lit(0.0).lt(r70), r29, lit(0.0));
-            let r29 = select(lit(0.0).lt(r71), r29, lit(0.0));
-            let r198 = binary(Binary::Less, lit(1e-12), r195);
-            let r198 = select(r197.ge(lit(0.5)), r198, lit(0.0));
-            let r195 = select(r198.ge(lit(0.5)), r195, lit(1.0));
-            let r197 = r195.sqrt();
-            let r197 = lit(0.5) * r197;
-            let r195 = unary(Unary::Reciprocal, r195);
-            let r197 = select(r198.ge(lit(0.5)), r197, lit(1.0));
-            let r199 = r197.mul_add(r197, r141);
-            let r199 = r199.sqrt();
-            let r200 = r197 + r199;
-            let r199 = r143 / r199;
-            let r199 = select(lit(0.1).lt(r200), r199, lit(0.0));
-            let r200 = lit(0.1).max(r200);
-            let r201 = r142 * r199;
-            let r201 = (-r200).mul_add(r140, r201);
-            let r202 = r142 * r200;
-            let r201 = r202 * r201;
-            let r201 = lit(2.0) * r201;
-            let r202 = r202 * r202;
-            let r201 = r202 * r201;
-            let r201 = lit(2.0) * r201;
-            let r202 = r202 * r202;
-            let r202 = unary(Unary::Reciprocal, r202);
-            let r203 = r139 * r202;
-            let r201 = (-r203).mul_add(r201, r138);
-            let r202 = r201 * r202;
-            let r201 = r197 * r200;
-            let r201 = r201 - lit(1.0);
-            let r200 = unary(Unary::Reciprocal, r200);
-            let r204 = r141 * r200;
-            let r205 = (-r204).mul_add(r199, r145);
-            let r200 = r205 * r200;
-            let r204 = r197.mul_add(r204, lit(1.0));
-            let r204 = unary(Unary::Reciprocal, r204);
-            let r201 = r201 * r204;
-            let r199 = (-r201).mul_add(r200, r199);
-            let r199 = r197 * r199;
-            let r204 = r199 * r204;
-            let r204 = r201 * r204;
-            let r204 = lit(2.0) * r204;
-            let r201 = r201.mul_add(r201, lit(1.0));
-            let r202 = r201 * r202;
-            let r202 = r203.mul_add(r204, r202);
-            let r202 = select(r28.lt(lit(1.0)), r202, lit(0.0));
-            let r201 = r203 * r201;
-            let r201 = select(r28.lt(lit(1.0)), r201, lit(1.0));
-            let r203 = r12 * r193;
-            let r203 = r13.mul_add(r194, r203);
-            let r203 = r14.mul_add(r196, r203);
-            let r204 = r12 * r194;
-            let r204 = (-r13).mul_add(r193, r204);
-            let r199 = r14 * r193;
-            let r199 = (-r12).mul_add(r196, r199);
-            let r197 = r13 * r196;
-            let r197 = (-r14).mul_add(r194, r197);
-            let r200 = r197 * r197;
-            let r200 = r199.mul_add(r199, r200);
-            let r200 = r204.mul_add(r204, r200);
-            let r205 = r203 * r203;
-            let r200 = r40.mul_add(r205, r200);
-            let r205 = r205 * r41;
-            let r200 = r200 * r195;
-            let r205 = r205 * r195;
-            let r200 = select(r198.ge(lit(0.5)), r200, lit(1.0));
-            let r205 = select(r198.ge(lit(0.5)), r205, lit(0.0));
-            let r205 = r200 * r205;
-            let r205 = lit(6.283185307179586) * r205;
-            let r206 = lit(3.141592653589793) * r200;
-            let r206 = r200 * r206;
-            let r206 = unary(Unary::Reciprocal, r206);
-            let r207 = r40 * r206;
-            let r205 = (-r207).mul_add(r205, r41);
-            let r205 = r205 * r206;
-            let r208 = select(r198.ge(lit(0.5)), r0, lit(1.0));
-            let r209 = r208 * r208;
-            let r210 = lit(1.0) - r209;
-            let r210 = r41 * r210;
-            let r209 = r158.mul_add(r209, r40);
-            let r210 = lit(0.5) * r210;
-            let r209 = r209.sqrt();
-            let r211 = select(r198.ge(lit(0.5)), r70, lit(1.0));
-            let r212 = r211 * r211;
-            let r213 = lit(1.0) - r212;
-            let r213 = r41 * r213;
-            let r212 = r158.mul_add(r212, r40);
-            let r213 = lit(0.5) * r213;
-            let r212 = r212.sqrt();
-            let r214 = r208 * r212;
-            let r214 = r211.mul_add(r209, r214);
-            let r215 = lit(1e-6).max(r214);
-            let r215 = unary(Unary::Reciprocal, r215);
-            let r216 = lit(0.5) * r215;
-            let r205 = r216 * r205;
-            let r217 = r207 * r216;
-            let r202 = r217 * r202;
-            let r202 = select(r198.ge(lit(0.5)), r202, lit(0.0));
-            let r217 = r201 * r217;
-            let r202 = r75 * r202;
-            let r217 = select(r198.ge(lit(0.5)), r217, lit(0.0));
-            let r202 = r74 * r202;
-            let r218 = r75 * r217;
-            let r218 = r74 * r218;
-            let r219 = r9 * r9;
-            let r219 = r10.mul_add(r10, r219);
-            let r219 = r11.mul_add(r11, r219);
-            let r220 = binary(Binary::Less, lit(1e-12), r219);
-            let r220 = select(r29.ge(lit(0.5)), r220, lit(0.0));
-            let r219 = select(r220.ge(lit(0.5)), r219, lit(1.0));
-            let r29 = r219.sqrt();
-            let r29 = lit(0.5) * r29;
-            let r219 = unary(Unary::Reciprocal, r219);
-            let r29 = select(r220.ge(lit(0.5)), r29, lit(1.0));
-            let r221 = r29.mul_add(r29, r141);
-            let r221 = r221.sqrt();
-            let r143 = r143 / r221;
-            let r221 = r29 + r221;
-            let r143 = select(lit(0.1).lt(r221), r143, lit(0.0));
-            let r221 = lit(0.1).max(r221);
-            let r222 = r142 * r143;
-            let r222 = (-r221).mul_add(r140, r222);
-            let r142 = r142 * r221;
-            let r222 = r142 * r222;
-            let r222 = lit(2.0) * r222;
-            let r142 = r142 * r142;
-            let r222 = r142 * r222;
-            let r222 = lit(2.0) * r222;
-            let r142 = r142 * r142;
-            let r142 = unary(Unary::Reciprocal, r142);
-            let r139 = r139 * r142;
-            let r138 = (-r139).mul_add(r222, r138);
-            let r142 = r138 * r142;
-            let r138 = r29 * r221;
-            let r138 = r138 - lit(1.0);
-            let r221 = unary(Unary::Reciprocal, r221);
-            let r141 = r141 * r221;
-            let r145 = (-r141).mul_add(r143, r145);
-            let r221 = r145 * r221;
-            let r141 = r29.mul_add(r141, lit(1.0));
-            let r141 = unary(Unary::Reciprocal, r141);
-            let r138 = r138 * r141;
-            let r143 = (-r138).mul_add(r221, r143);
-            let r143 = r29 * r143;
-            let r141 = r143 * r141;
-            let r141 = r138 * r141;
-            let r141 = lit(2.0) * r141;
-            let r138 = r138.mul_add(r138, lit(1.0));
-            let r142 = r138 * r142;
-            let r142 = r139.mul_add(r141, r142);
-            let r142 = select(r28.lt(lit(1.0)), r142, lit(0.0));
-            let r138 = r139 * r138;
-            let r138 = select(r28.lt(lit(1.0)), r138, lit(1.0));
-            let r28 = r12 * r9;
-            let r28 = r13.mul_add(r10, r28);
-            let r28 = r14.mul_add(r11, r28);
-            let r139 = r12 * r10;
-            let r139 = (-r13).mul_add(r9, r139);
-            let r13 = r13 * r11;
-            let r141 = r14 * r9;
-            let r141 = (-r12).mul_add(r11, r141);
-            let r13 = (-r14).mul_add(r10, r13);
-            let r14 = r13 * r13;
-            let r14 = r141.mul_add(r141, r14);
-            let r14 = r139.mul_add(r139, r14);
-            let r12 = r28 * r28;
-            let r14 = r40.mul_add(r12, r14);
-            let r12 = r12 * r41;
-            let r14 = r14 * r219;
-            let r12 = r12 * r219;
-            let r14 = select(r220.ge(lit(0.5)), r14, lit(1.0));
-            let r12 = select(r220.ge(lit(0.5)), r12, lit(0.0));
-            let r12 = r14 * r12;
-            let r12 = lit(6.283185307179586) * r12;
-            let r143 = lit(3.141592653589793) * r14;
-            let r143 = r14 * r143;
-            let r143 = unary(Unary::Reciprocal, r143);
-            let r29 = r40 * r143;
-            let r12 = (-r29).mul_add(r12, r41);
-            let r12 = r12 * r143;
-            let r221 = select(lit(0.0).lt(r0), r1, lit(0.0));
-            let r221 = select(lit(1e-6).lt(r45), r221, lit(0.0));
-            let r0 = select(r220.ge(lit(0.5)), r0, lit(1.0));
-            let r49 = r221 * r49;
-            let r48 = r49 * r48;
-            let r51 = r221 * r51;
-            let r48 = lit(0.5) * r48;
-            let r54 = r51 * r54;
-            let r50 = r48 * r50;
-            let r54 = lit(0.5) * r54;
-            let r59 = r50 * r59;
-            let r24 = r54 * r24;
-            let r59 = lit(4.0) * r59;
-            let r24 = r63 * r24;
-            let r24 = -r24;
-            let r24 = select(lit(0.0).lt(r56), r24, lit(0.0));
-            let r56 = r0 * r0;
-            let r63 = lit(1.0) - r56;
-            let r63 = r41 * r63;
-            let r56 = r158.mul_add(r56, r40);
-            let r63 = lit(0.5) * r63;
-            let r56 = r56.sqrt();
-            let r54 = select(r220.ge(lit(0.5)), r71, lit(1.0));
-            let r50 = r54 * r54;
-            let r48 = lit(1.0) - r50;
-            let r48 = r41 * r48;
-            let r50 = r158.mul_add(r50, r40);
-            let r48 = lit(0.5) * r48;
-            let r50 = r50.sqrt();
-            let r41 = r0 * r50;
-            let r41 = r54.mul_add(r56, r41);
-            let r51 = lit(1e-6).max(r41);
-            let r51 = unary(Unary::Reciprocal, r51);
-            let r221 = lit(0.5) * r51;
-            let r12 = r221 * r12;
-            let r49 = r29 * r221;
-            let r142 = r49 * r142;
-            let r142 = select(r220.ge(lit(0.5)), r142, lit(0.0));
-            let r49 = r138 * r49;
-            let r142 = r73 * r142;
-            let r49 = select(r220.ge(lit(0.5)), r49, lit(0.0));
-            let r142 = r72 * r142;
-            let r45 = u(176) * r142;
-            let r45 = u(177).mul_add(r202, r45);
-            let r45 = u(178).mul_add(r176, r45);
-            let r45 = u(179).mul_add(r149, r45);
-            let r45 = u(134).mul_add(r130, r45);
-            let r130 = u(180) * r142;
-            let r130 = u(181).mul_add(r202, r130);
-            let r142 = u(182) * r142;
-            let r130 = u(183).mul_add(r176, r130);
-            let r142 = u(184).mul_add(r202, r142);
-            let r130 = u(185).mul_add(r149, r130);
-            let r142 = u(186).mul_add(r176, r142);
-            let r142 = u(187).mul_add(r149, r142);
-            let r149 = r73 * r49;
-            let r149 = r72 * r149;
-            let r176 = r149 * u(188);
-            let r176 = r218.mul_add(u(189), r176);
-            let r176 = r192.mul_add(u(190), r176);
-            let r176 = r166.mul_add(u(191), r176);
-            let r176 = r123 + r176;
-            let r202 = r149 * u(192);
-            let r202 = r218.mul_add(u(193), r202);
-            let r202 = r192.mul_add(u(194), r202);
-            let r202 = r166.mul_add(u(195), r202);
-            let r145 = r149 * u(196);
-            let r145 = r218.mul_add(u(197), r145);
-            let r145 = r192.mul_add(u(198), r145);
-            let r145 = r166.mul_add(u(199), r145);
-            let r222 = u(200) * r149;
-            let r222 = u(201).mul_add(r218, r222);
-            let r222 = u(202).mul_add(r192, r222);
-            let r222 = u(203).mul_add(r166, r222);
-            let r222 = u(134).mul_add(r123, r222);
-            let r123 = samples(0);
-            let r222 = r123.mul_add(r99, r222);
-            put(0, i, r222);
-            let r99 = r57 * u(204);
-            let r140 = lit(1.0).min(r99);
-            let r140 = (-u(135)).mul_add(r140, lit(1.0));
-            let r223 = select(r99.lt(lit(1.0)), r57, lit(0.0));
-            let r99 = select(r99.lt(lit(1.0)), u(204), lit(0.0));
-            let r224 = r38.mul_add(u(205), u(206));
-            let r223 = r224 * r223;
-            let r225 = r52 * r224;
-            let r225 = r99 * r225;
-            let r226 = r76 * u(207);
-            let r226 = r77.mul_add(u(208), r226);
-            let r226 = r83.mul_add(u(209), r226);
-            let r227 = kept(1);
-            let r103 = r227 * r103;
-            let r228 = u(135) * r103;
-            let r80 = r80 - r228;
-            let r228 = -r228;
-            let r94 = r228 - r94;
-            let r84 = r94 - r84;
-            let r79 = r84 - r79;
-            let r78 = r79 - r78;
-            let r223 = r78 * r223;
-            let r225 = r78 * r225;
-            let r79 = r93 * u(210);
-            let r84 = r226 + r79;
-            let r84 = r84 + r103;
-            let r226 = r226 + r103;
-            let r226 = r79 + r226;
-            let r79 = r140 * r224;
-            let r84 = r79 * r84;
-            let r79 = samples(24);
-            let r94 = r126 * r132;
-            let r94 = r42.mul_add(r79, r94);
-            let r228 = r52 * r94;
-            let r228 = r64 * r228;
-            let r94 = r57 * r94;
-            let r130 = u(204).mul_add(r228, r130);
-            let r202 = r94 + r202;
-            let r228 = samples(22);
-            let r202 = r228.mul_add(r223, r202);
-            put(16, i, r202);
-            let r223 = r64 * r228;
-            let r130 = r223.mul_add(r225, r130);
-            put(25, i, r130);
-            let r225 = r149 * u(211);
-            let r225 = r218.mul_add(u(212), r225);
-            let r149 = r149 * u(213);
-            let r225 = r192.mul_add(u(214), r225);
-            let r149 = r218.mul_add(u(215), r149);
-            let r225 = r166.mul_add(u(216), r225);
-            let r149 = r192.mul_add(u(217), r149);
-            let r225 = u(204).mul_add(r94, r225);
-            let r149 = r166.mul_add(u(218), r149);
-            let r225 = r228.mul_add(r84, r225);
-            put(1, i, r225);
-            let r84 = r57 * u(219);
-            let r166 = lit(1.0).min(r84);
-            let r166 = (-u(135)).mul_add(r166, lit(1.0));
-            let r94 = select(r84.lt(lit(1.0)), r57, lit(0.0));
-            let r84 = select(r84.lt(lit(1.0)), u(219), lit(0.0));
-            let r192 = r38.mul_add(u(220), u(221));
-            let r94 = r192 * r94;
-            let r218 = r52 * r192;
-            let r218 = r84 * r218;
-            let r223 = r76 * u(222);
-            let r223 = r77.mul_add(u(223), r223);
-            let r223 = r83.mul_add(u(224), r223);
-            let r229 = kept(2);
-            let r104 = r229 * r104;
-            let r230 = u(135) * r104;
-            let r87 = r87 - r230;
-            let r230 = -r230;
-            let r95 = r230 - r95;
-            let r88 = r95 - r88;
-            let r86 = r88 - r86;
-            let r85 = r86 - r85;
-            let r94 = r85 * r94;
-            let r218 = r85 * r218;
-            let r86 = r93 * u(225);
-            let r88 = r223 + r86;
-            let r88 = r88 + r104;
-            let r223 = r223 + r104;
-            let r223 = r86 + r223;
-            let r86 = r166 * r192;
-            let r88 = r86 * r88;
-            let r86 = samples(27);
-            let r95 = r126 * r133;
-            let r95 = r42.mul_add(r86, r95);
-            let r230 = r52 * r95;
-            let r230 = r64 * r230;
-            let r95 = r57 * r95;
-            let r52 = r52 * r68;
-            let r142 = u(219).mul_add(r230, r142);
-            let r145 = r95 + r145;
+            let at = texels531;
+            let ([r108, r109, r110, _], [r111, r112, r113, _]) = cube.sample_with_slope(&at, cube.texels([r31, r32]));
+            let r106 = r106 - r112;
+            let r107 = r107 - r113;
+            let r40 = r40 - r108;
+            let r41 = r41 - r109;
+            let r104 = r104 - r110;
+            let r105 = r105 - r111;
+            let r112 = r36.mul_add(r106, r112);
+            let r113 = r36.mul_add(r107, r113);
+            let r108 = r36.mul_add(r40, r108);
+            let r109 = r36.mul_add(r41, r109);
+            let r110 = r36.mul_add(r104, r110);
+            let r104 = samples(21);
+            let r41 = lit(1.0) - r102;
+            let r40 = r102 * r108;
+            let r40 = r104.mul_add(r41, r40);
+            let r107 = r58 * r40;
+            let r107 = r63 * r107;
+            let r40 = r55 * r40;
+            let r107 = u(146) * r107;
+            let r106 = r55 * u(159);
+            let r32 = lit(1.0).min(r106);
+            let r32 = (-u(147)).mul_add(r32, lit(1.0));
+            let r31 = select(r106.lt(lit(1.0)), r55, lit(0.0));
+            let r106 = select(r106.lt(lit(1.0)), u(159), lit(0.0));
+            let r30 = r38.mul_add(u(160), u(161));
+            let r31 = r30 * r31;
+            let r29 = r58 * r30;
+            let r29 = r106 * r29;
+            let r28 = kept(1);
+            let r78 = r28 * r78;
+            let r75 = r28 * r75;
+            let r28 = u(147) * r75;
+            let r28 = -r28;
+            let r114 = samples(24);
+            let r115 = r102 * r109;
+            let r115 = r41.mul_add(r114, r115);
+            let r116 = r58 * r115;
+            let r116 = r63 * r116;
+            let r115 = r55 * r115;
+            let r116 = u(159) * r116;
+            let r117 = r55 * u(162);
+            let r118 = lit(1.0).min(r117);
+            let r118 = (-u(147)).mul_add(r118, lit(1.0));
+            let r119 = select(r117.lt(lit(1.0)), r55, lit(0.0));
+            let r117 = select(r117.lt(lit(1.0)), u(162), lit(0.0));
+            let r120 = r38.mul_add(u(163), u(164));
+            let r119 = r120 * r119;
+            let r121 = r58 * r120;
+            let r121 = r117 * r121;
+            let r122 = kept(2);
+            let r79 = r122 * r79;
+            let r76 = r122 * r76;
+            let r122 = u(147) * r76;
+            let r122 = -r122;
+            let r123 = samples(27);
+            let r124 = r102 * r110;
+            let r124 = r41.mul_add(r123, r124);
+            let r125 = r58 * r124;
+            let r125 = r63 * r125;
+            let r124 = r55 * r124;
+            let r58 = r58 * r67;
+            let r125 = u(162) * r125;
+            let r58 = r51 * r58;
+            let r126 = select(lit(0.0).lt(r0), r1, lit(0.0));
+            let r126 = select(lit(1e-6).lt(r43), r126, lit(0.0));
+            let r47 = r126 * r47;
+            let r46 = r47 * r46;
+            let r49 = r126 * r49;
+            let r46 = lit(0.5) * r46;
+            let r52 = r49 * r52;
+            let r48 = r46 * r48;
+            let r52 = lit(0.5) * r52;
+            let r57 = r48 * r57;
+            let r60 = r52 * r60;
+            let r57 = lit(4.0) * r57;
+            let r60 = r62 * r60;
+            let r60 = -r60;
+            let r60 = select(lit(0.0).lt(r50), r60, lit(0.0));
+            let r50 = r45 * r61;
+            let r50 = lit(2.0) * r50;
+            let r50 = r54 * r50;
+            let r50 = lit(2.0) * r50;
+            let r50 = r45 * r50;
+            let r50 = r59.mul_add(r61, r50);
+            let r50 = r53 * r50;
+            let r50 = (-r65).mul_add(r56, r50);
+            let r56 = -r56;
+            let r56 = r56 - r50;
+            let r56 = r63 * r56;
+            let r50 = u(145).mul_add(r56, r50);
+            let r56 = r67 * r50;
+            let r56 = r51 * r56;
+            let r61 = r30 * r50;
+            let r61 = r106 * r61;
+            let r62 = r120 * r50;
+            let r62 = r117 * r62;
+            let r52 = r45 * r60;
+            let r52 = lit(2.0) * r52;
+            let r52 = r54 * r52;
+            let r52 = lit(2.0) * r52;
+            let r52 = r45 * r52;
+            let r52 = r59.mul_add(r60, r52);
             let r52 = r53 * r52;
-            let r149 = u(219).mul_add(r95, r149);
-            let r95 = samples(25);
-            let r145 = r95.mul_add(r94, r145);
-            put(17, i, r145);
-            let r149 = r95.mul_add(r88, r149);
-            put(2, i, r149);
-            let r88 = r64 * r95;
-            let r142 = r88.mul_add(r218, r142);
-            put(26, i, r142);
-            let r218 = r65 * r89;
-            let r218 = r123 * r218;
-            put(3, i, r218);
-            let r88 = r140 * r226;
-            let r88 = r228 * r88;
-            put(4, i, r88);
-            let r94 = r166 * r223;
-            let r94 = r95 * r94;
-            put(5, i, r94);
-            let r230 = r65 * r38;
-            let r230 = r89 * r230;
-            let r230 = r123 * r230;
-            put(6, i, r230);
-            let r89 = r38 * r140;
-            let r89 = r226 * r89;
-            let r38 = r38 * r166;
-            let r89 = r228 * r89;
-            put(7, i, r89);
-            let r38 = r223 * r38;
-            let r38 = r95 * r38;
-            put(8, i, r38);
-            let r223 = r76 * u(226);
-            let r223 = r77.mul_add(u(227), r223);
-            let r223 = r83.mul_add(u(228), r223);
-            let r223 = u(136).mul_add(r102, r223);
-            let r223 = r93.mul_add(u(229), r223);
-            let r102 = u(135) * r102;
-            let r226 = r65 * r37;
-            let r226 = r223 * r226;
-            let r226 = r123 * r226;
-            put(9, i, r226);
-            let r223 = r76 * u(230);
-            let r223 = r77.mul_add(u(231), r223);
-            let r223 = r83.mul_add(u(232), r223);
-            let r223 = u(205).mul_add(r103, r223);
-            let r223 = r93.mul_add(u(233), r223);
-            let r103 = r140 * r37;
-            let r103 = r223 * r103;
-            let r37 = r166 * r37;
-            let r103 = r228 * r103;
-            put(10, i, r103);
-            let r223 = r76 * u(234);
-            let r223 = r77.mul_add(u(235), r223);
-            let r76 = r76 * u(236);
-            let r223 = r83.mul_add(u(237), r223);
-            let r77 = r77 * u(238);
-            let r223 = u(220).mul_add(r104, r223);
-            let r83 = r83 * u(239);
-            let r223 = r93.mul_add(u(240), r223);
-            let r37 = r223 * r37;
-            let r93 = r93 * u(241);
-            let r37 = r95 * r37;
-            put(11, i, r37);
-            let r223 = r47 * r61;
-            let r223 = lit(2.0) * r223;
-            let r223 = r62 * r223;
-            let r223 = lit(2.0) * r223;
-            let r223 = r47 * r223;
-            let r223 = r60.mul_add(r61, r223);
-            let r223 = r55 * r223;
-            let r223 = (-r66).mul_add(r58, r223);
-            let r58 = -r58;
-            let r58 = r58 - r223;
-            let r58 = r64 * r58;
-            let r223 = u(133).mul_add(r58, r223);
-            let r58 = r68 * r223;
-            let r58 = r53 * r58;
-            let r61 = r42 * r223;
-            let r61 = r61 - r39;
-            let r39 = r126.mul_add(r223, r39);
-            let r104 = r224 * r223;
-            let r104 = r99 * r104;
-            let r223 = r192 * r223;
-            let r104 = r78 * r104;
-            let r223 = r84 * r223;
-            let r223 = r85 * r223;
-            let r85 = r34 * r39;
-            let r39 = r39 * r35;
-            let r78 = r61 * r35;
-            let r61 = r34 * r61;
-            let r231 = r47 * r24;
-            let r231 = lit(2.0) * r231;
-            let r231 = r62 * r231;
-            let r231 = lit(2.0) * r231;
-            let r231 = r47 * r231;
-            let r231 = r60.mul_add(r24, r231);
-            let r231 = r55 * r231;
-            let r231 = (-r66).mul_add(r59, r231);
-            let r59 = -r59;
-            let r59 = r59 - r231;
-            let r59 = r64 * r59;
-            let r231 = u(133).mul_add(r59, r231);
-            let r64 = r123 * r64;
-            let r99 = r231 * r99;
-            let r84 = r231 * r84;
-            let r53 = r53 * r231;
-            let r42 = r42 * r231;
-            let r59 = -r76;
-            let r59 = r59 - r77;
-            let r59 = r59 - r83;
-            let r59 = r59 - r93;
-            let r66 = -r102;
-            let r93 = r66 - r93;
-            let r102 = r59 - r102;
-            let r83 = r93 - r83;
-            let r77 = r83 - r77;
-            let r76 = r77 - r76;
-            let r67 = r76 * r67;
-            let r58 = r76 * r58;
-            let r176 = r123.mul_add(r67, r176);
-            put(15, i, r176);
-            let r52 = r76 * r52;
-            let r45 = r64.mul_add(r52, r45);
-            put(24, i, r45);
-            let r52 = u(156) * r15;
-            let r52 = u(157).mul_add(r16, r52);
-            let r52 = u(158).mul_add(r17, r52);
-            let r90 = select(lit(0.0).lt(r90), r52, lit(0.0));
-            let r52 = select(r137.ge(lit(0.5)), r52, lit(0.0));
-            let r64 = u(138) * r15;
-            let r64 = u(139).mul_add(r16, r64);
-            let r64 = u(140).mul_add(r17, r64);
-            let r69 = select(lit(0.0).lt(r69), r64, lit(0.0));
-            let r64 = select(r172.ge(lit(0.5)), r64, lit(0.0));
-            let r76 = u(141) * r15;
-            let r76 = u(142).mul_add(r16, r76);
-            let r76 = u(143).mul_add(r17, r76);
-            let r70 = select(lit(0.0).lt(r70), r76, lit(0.0));
-            let r76 = select(r198.ge(lit(0.5)), r76, lit(0.0));
-            let r217 = r217 * r70;
-            let r70 = r74 * r70;
-            let r67 = u(144) * r15;
-            let r67 = u(145).mul_add(r16, r67);
-            let r67 = u(146).mul_add(r17, r67);
-            let r71 = select(lit(0.0).lt(r71), r67, lit(0.0));
-            let r67 = select(r220.ge(lit(0.5)), r67, lit(0.0));
-            let r49 = r49 * r71;
-            let r71 = r72 * r71;
-            let r77 = r71 * u(242);
-            let r77 = r70.mul_add(u(243), r77);
-            let r83 = r81 * r69;
-            let r77 = r83.mul_add(u(244), r77);
-            let r69 = r191 * r69;
-            let r191 = r91 * r90;
-            let r77 = r191.mul_add(u(245), r77);
-            let r90 = r165 * r90;
-            let r77 = r227.mul_add(r106, r77);
-            let r77 = r140 * r77;
-            let r77 = r99.mul_add(r80, r77);
-            let r77 = r224 * r77;
-            let r224 = r71 * u(246);
-            let r224 = r70.mul_add(u(247), r224);
-            let r71 = r71 * u(248);
-            let r224 = r83.mul_add(u(249), r224);
-            let r71 = r70.mul_add(u(250), r71);
-            let r224 = r191.mul_add(u(251), r224);
-            let r71 = r83.mul_add(u(252), r71);
-            let r224 = r229.mul_add(r107, r224);
-            let r71 = r191.mul_add(u(253), r71);
-            let r224 = r166 * r224;
-            let r71 = r101.mul_add(r105, r71);
-            let r224 = r84.mul_add(r87, r224);
-            let r71 = r65 * r71;
-            let r224 = r192 * r224;
-            let r71 = r53.mul_add(r102, r71);
-            let r71 = r68 * r71;
-            let r68 = unary(Unary::Reciprocal, r3);
-            let r2 = r2 * r68;
-            let r18 = r18 * r68;
-            let r4 = r4 * r68;
+            let r52 = (-r65).mul_add(r57, r52);
+            let r57 = -r57;
+            let r57 = r57 - r52;
+            let r57 = r63 * r57;
+            let r52 = u(145).mul_add(r57, r52);
+            let r106 = r52 * r106;
+            let r117 = r52 * r117;
+            let r51 = r51 * r52;
+            let r57 = u(147) * r74;
+            let r57 = -r57;
+            let r65 = r41 * r52;
+            let r41 = r41 * r50;
+            let r53 = unary(Unary::Reciprocal, r3);
+            let r2 = r2 * r53;
+            let r18 = r18 * r53;
+            let r4 = r4 * r53;
             let r3 = lit(1000000.0) * r3;
             let r2 = select(r5.ge(lit(0.5)), r2, lit(0.0));
             let r18 = select(r5.ge(lit(0.5)), r18, lit(0.0));
@@ -11815,409 +10427,546 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r22 = r3.min(r22);
             let r21 = r3.min(r21);
             let r20 = r19.max(r20);
-            let r22 = r22 * r68;
-            let r21 = r21 * r68;
+            let r22 = r22 * r53;
+            let r21 = r21 * r53;
             let r20 = r3.min(r20);
             let r22 = select(r5.ge(lit(0.5)), r22, r17);
             let r21 = select(r5.ge(lit(0.5)), r21, r16);
-            let r68 = r20 * r68;
-            let r68 = select(r5.ge(lit(0.5)), r68, r15);
-            let r5 = r100.abs();
-            let r100 = unary(Unary::IsFinite, r100);
-            let r20 = r98.abs();
+            let r53 = r20 * r53;
+            let r53 = select(r5.ge(lit(0.5)), r53, r15);
+            let r5 = r80.abs();
+            let r80 = unary(Unary::IsFinite, r80);
+            let r20 = r81.abs();
             let r20 = r5.max(r20);
-            let r98 = unary(Unary::IsFinite, r98);
-            let r98 = r100 * r98;
-            let r100 = r97.abs();
-            let r100 = r20.max(r100);
-            let r97 = unary(Unary::IsFinite, r97);
-            let r97 = r98 * r97;
-            let r97 = select(r100.ge(lit(1e-37)), r97, lit(0.0));
-            let r100 = select(r97.ge(lit(0.5)), r100, lit(1.0));
-            let r98 = lit(1000000.0) * r100;
-            let r20 = -r98;
+            let r81 = unary(Unary::IsFinite, r81);
+            let r81 = r80 * r81;
+            let r80 = r82.abs();
+            let r80 = r20.max(r80);
+            let r82 = unary(Unary::IsFinite, r82);
+            let r82 = r81 * r82;
+            let r82 = select(r80.ge(lit(1e-37)), r82, lit(0.0));
+            let r80 = select(r82.ge(lit(0.5)), r80, lit(1.0));
+            let r81 = lit(1000000.0) * r80;
+            let r20 = -r81;
             let r20 = lit(0.0).max(r20);
-            let r20 = r98.min(r20);
-            let r100 = r20 / r100;
-            let r20 = select(r97.ge(lit(0.5)), r100, r15);
-            let r20 = r110 * r20;
-            let r110 = select(r97.ge(lit(0.5)), r100, r16);
-            let r20 = r111.mul_add(r110, r20);
-            let r100 = select(r97.ge(lit(0.5)), r100, r17);
-            let r20 = r112.mul_add(r100, r20);
-            let r20 = r96.mul_add(r68, r20);
-            let r20 = r108.mul_add(r21, r20);
-            let r20 = r109.mul_add(r22, r20);
-            let r22 = binary(Binary::Less, lit(0.0), r113);
-            let r109 = binary(Binary::Less, r113, lit(0.0));
-            let r109 = r22 - r109;
-            let r109 = r20 * r109;
-            let r109 = select(r114.lt(lit(0.999999)), r109, lit(0.0));
-            let r117 = r109 * r117;
-            let r118 = r118 * r109;
-            let r118 = r115.mul_add(r117, r118);
-            let r109 = lit(0.5) * r109;
-            let r118 = r116 * r118;
-            let r116 = r109 / r116;
-            let r116 = r119 * r116;
-            let r119 = r116 - r118;
-            let r116 = r118 - r116;
-            let r119 = select(r113.ge(lit(0.0)), r116, r119);
-            let r122 = r119 * r122;
-            let r122 = -r122;
-            let r122 = select(lit(0.0).lt(r121), r122, lit(0.0));
-            let r122 = select(r46.lt(lit(1.0)), r122, lit(0.0));
-            let r124 = r124 * r122;
-            let r122 = r125 * r122;
-            let r122 = lit(2.0) * r122;
-            let r122 = r127 * r122;
-            let r122 = (-lit(2.0)).mul_add(r124, r122);
-            let r122 = r120 * r122;
-            let r44 = r122 * r44;
-            let r44 = r57 * r44;
-            let r42 = r42 - r44;
-            let r57 = r57 * r126;
-            let r27 = r57 * r27;
-            let r26 = r57 * r26;
-            let r25 = r57 * r25;
-            let r44 = r126.mul_add(r231, r44);
+            let r20 = r81.min(r20);
+            let r80 = r20 / r80;
+            let r20 = select(r82.ge(lit(0.5)), r80, r15);
+            let r20 = r86 * r20;
+            let r86 = select(r82.ge(lit(0.5)), r80, r16);
+            let r20 = r87.mul_add(r86, r20);
+            let r80 = select(r82.ge(lit(0.5)), r80, r17);
+            let r20 = r88.mul_add(r80, r20);
+            let r20 = r83.mul_add(r53, r20);
+            let r20 = r84.mul_add(r21, r20);
+            let r20 = r85.mul_add(r22, r20);
+            let r22 = binary(Binary::Less, lit(0.0), r89);
+            let r85 = binary(Binary::Less, r89, lit(0.0));
+            let r85 = r22 - r85;
+            let r85 = r20 * r85;
+            let r85 = select(r90.lt(lit(0.999999)), r85, lit(0.0));
+            let r93 = r85 * r93;
+            let r94 = r94 * r85;
+            let r94 = r91.mul_add(r93, r94);
+            let r85 = lit(0.5) * r85;
+            let r94 = r92 * r94;
+            let r92 = r85 / r92;
+            let r92 = r95 * r92;
+            let r95 = r92 - r94;
+            let r92 = r94 - r92;
+            let r95 = select(r89.ge(lit(0.0)), r92, r95);
+            let r98 = r95 * r98;
+            let r98 = -r98;
+            let r98 = select(lit(0.0).lt(r97), r98, lit(0.0));
+            let r98 = select(r44.lt(lit(1.0)), r98, lit(0.0));
+            let r100 = r100 * r98;
+            let r98 = r101 * r98;
+            let r98 = lit(2.0) * r98;
+            let r98 = r103 * r98;
+            let r98 = (-lit(2.0)).mul_add(r100, r98);
+            let r98 = r96 * r98;
+            let r42 = r98 * r42;
+            let r42 = r55 * r42;
+            let r65 = r65 - r42;
+            let r42 = r102.mul_add(r52, r42);
+            let r52 = r55 * r102;
+            let r27 = r52 * r27;
+            let r26 = r52 * r26;
+            let r25 = r52 * r25;
+            let r55 = r55 * r24;
             let r27 = r36 * r27;
             let r26 = r36 * r26;
             let r25 = r36 * r25;
-            let r134 = r36.mul_add(r128, r134);
-            let r128 = r133 * r85;
-            let r128 = r57.mul_add(r33, r128);
-            let r33 = r133 * r39;
-            let r133 = r133 * r44;
-            let r33 = u(255).mul_add(r25, r33);
-            let r133 = r57.mul_add(r136, r133);
-            let r136 = r131 * r85;
-            let r136 = r57.mul_add(r23, r136);
-            let r85 = r132 * r85;
-            let r136 = r43.mul_add(r61, r136);
-            let r85 = r57.mul_add(r8, r85);
-            let r136 = u(134) * r136;
-            let r85 = r79.mul_add(r61, r85);
-            let r85 = u(204) * r85;
-            let r128 = r86.mul_add(r61, r128);
-            let r128 = u(219) * r128;
-            let r61 = r131 * r39;
-            let r61 = u(255).mul_add(r27, r61);
-            let r39 = r132 * r39;
-            let r61 = r43.mul_add(r78, r61);
-            let r39 = u(255).mul_add(r26, r39);
-            let r132 = r132 * r44;
-            let r61 = u(134) * r61;
-            let r39 = r79.mul_add(r78, r39);
-            let r132 = r57.mul_add(r135, r132);
-            let r44 = r131 * r44;
-            let r39 = u(204) * r39;
-            let r33 = r86.mul_add(r78, r33);
-            let r132 = r79.mul_add(r42, r132);
-            let r44 = r57.mul_add(r134, r44);
-            let r33 = u(219) * r33;
-            let r133 = r86.mul_add(r42, r133);
-            let r44 = r43.mul_add(r42, r44);
-            let r42 = select(r137.ge(lit(0.5)), r1, lit(0.0));
-            let r43 = r155 * r42;
-            let r43 = lit(2.0) * r43;
-            let r43 = r158 * r43;
-            let r43 = lit(0.5) * r43;
-            let r86 = unary(Unary::Reciprocal, r156);
-            let r157 = r157 * r86;
-            let r86 = r43 * r86;
-            let r43 = r159 * r52;
-            let r43 = lit(2.0) * r43;
-            let r43 = r158 * r43;
-            let r43 = lit(0.5) * r43;
-            let r134 = unary(Unary::Reciprocal, r160);
-            let r161 = r161 * r134;
-            let r42 = r160 * r42;
-            let r161 = r155 * r161;
-            let r134 = r43 * r134;
-            let r161 = r159.mul_add(r157, r161);
-            let r42 = r155.mul_add(r134, r42);
-            let r161 = select(lit(1e-6).lt(r162), r161, lit(0.0));
-            let r42 = r156.mul_add(r52, r42);
-            let r161 = r164 * r161;
-            let r42 = r159.mul_add(r86, r42);
-            let r161 = r161 * r163;
-            let r42 = select(lit(1e-6).lt(r162), r42, lit(0.0));
-            let r152 = (-r154).mul_add(r161, r152);
-            let r42 = r164 * r42;
-            let r152 = r148 * r152;
-            let r163 = r42 * r163;
-            let r152 = select(r137.ge(lit(0.5)), r152, lit(0.0));
-            let r152 = r92 * r152;
-            let r152 = r91 * r152;
-            let r42 = r32 * r15;
-            let r42 = (-r129).mul_add(r16, r42);
-            let r161 = r129 * r17;
-            let r161 = (-r30).mul_add(r15, r161);
-            let r129 = r129 * r15;
-            let r162 = r30 * r16;
-            let r162 = (-r32).mul_add(r17, r162);
-            let r162 = r144 * r162;
-            let r129 = r32.mul_add(r16, r129);
-            let r162 = r146.mul_add(r161, r162);
-            let r129 = r30.mul_add(r17, r129);
-            let r162 = r151.mul_add(r42, r162);
-            let r129 = r150 * r129;
-            let r129 = lit(2.0) * r129;
-            let r129 = r40 * r129;
-            let r129 = lit(2.0).mul_add(r162, r129);
-            let r31 = r129 * r31;
-            let r31 = select(r137.ge(lit(0.5)), r31, lit(0.0));
-            let r31 = r147 * r31;
-            let r31 = lit(6.283185307179586) * r31;
-            let r31 = r154 * r31;
-            let r153 = r31 * r153;
-            let r153 = r164 * r153;
-            let r153 = -r153;
-            let r153 = (-r154).mul_add(r163, r153);
-            let r153 = r148 * r153;
-            let r153 = select(r137.ge(lit(0.5)), r153, lit(0.0));
-            let r153 = r92 * r153;
-            let r153 = lit(0.3183098861837907) * r153;
-            let r153 = lit(0.3183098861837907).mul_add(r90, r153);
-            let r153 = r91 * r153;
-            let r91 = select(r172.ge(lit(0.5)), r1, lit(0.0));
-            let r90 = r182 * r91;
-            let r90 = lit(2.0) * r90;
-            let r90 = r158 * r90;
-            let r90 = lit(0.5) * r90;
-            let r92 = unary(Unary::Reciprocal, r183);
-            let r184 = r184 * r92;
-            let r92 = r90 * r92;
-            let r90 = r185 * r64;
-            let r90 = lit(2.0) * r90;
-            let r90 = r158 * r90;
-            let r90 = lit(0.5) * r90;
-            let r137 = unary(Unary::Reciprocal, r186);
-            let r187 = r187 * r137;
-            let r91 = r186 * r91;
-            let r187 = r182 * r187;
-            let r137 = r90 * r137;
-            let r187 = r185.mul_add(r184, r187);
-            let r91 = r182.mul_add(r137, r91);
-            let r187 = select(lit(1e-6).lt(r188), r187, lit(0.0));
-            let r91 = r183.mul_add(r64, r91);
-            let r187 = r190 * r187;
-            let r91 = r185.mul_add(r92, r91);
-            let r187 = r187 * r189;
-            let r91 = select(lit(1e-6).lt(r188), r91, lit(0.0));
-            let r179 = (-r181).mul_add(r187, r179);
-            let r91 = r190 * r91;
-            let r179 = r175 * r179;
-            let r189 = r91 * r189;
-            let r179 = select(r172.ge(lit(0.5)), r179, lit(0.0));
-            let r179 = r82 * r179;
-            let r179 = r81 * r179;
-            let r91 = r168 * r15;
-            let r91 = (-r167).mul_add(r16, r91);
-            let r187 = r167 * r17;
-            let r187 = (-r170).mul_add(r15, r187);
-            let r167 = r167 * r15;
-            let r188 = r170 * r16;
-            let r188 = (-r168).mul_add(r17, r188);
-            let r188 = r171 * r188;
-            let r167 = r168.mul_add(r16, r167);
-            let r188 = r173.mul_add(r187, r188);
-            let r167 = r170.mul_add(r17, r167);
-            let r188 = r178.mul_add(r91, r188);
-            let r167 = r177 * r167;
-            let r167 = lit(2.0) * r167;
-            let r167 = r40 * r167;
-            let r167 = lit(2.0).mul_add(r188, r167);
-            let r169 = r167 * r169;
-            let r169 = select(r172.ge(lit(0.5)), r169, lit(0.0));
-            let r169 = r174 * r169;
-            let r169 = lit(6.283185307179586) * r169;
-            let r169 = r181 * r169;
-            let r180 = r169 * r180;
-            let r180 = r190 * r180;
-            let r180 = -r180;
-            let r180 = (-r181).mul_add(r189, r180);
-            let r180 = r175 * r180;
-            let r180 = select(r172.ge(lit(0.5)), r180, lit(0.0));
-            let r180 = r82 * r180;
-            let r180 = lit(0.3183098861837907) * r180;
-            let r180 = lit(0.3183098861837907).mul_add(r69, r180);
-            let r180 = r81 * r180;
-            let r81 = select(r198.ge(lit(0.5)), r1, lit(0.0));
-            let r1 = select(r220.ge(lit(0.5)), r1, lit(0.0));
-            let r69 = r208 * r81;
-            let r69 = lit(2.0) * r69;
-            let r69 = r158 * r69;
-            let r69 = lit(0.5) * r69;
-            let r82 = unary(Unary::Reciprocal, r209);
-            let r210 = r210 * r82;
-            let r82 = r69 * r82;
-            let r69 = r211 * r76;
-            let r69 = lit(2.0) * r69;
-            let r69 = r158 * r69;
-            let r69 = lit(0.5) * r69;
-            let r172 = unary(Unary::Reciprocal, r212);
-            let r213 = r213 * r172;
-            let r81 = r212 * r81;
-            let r213 = r208 * r213;
-            let r172 = r69 * r172;
-            let r213 = r211.mul_add(r210, r213);
-            let r81 = r208.mul_add(r172, r81);
-            let r213 = select(lit(1e-6).lt(r214), r213, lit(0.0));
-            let r81 = r209.mul_add(r76, r81);
-            let r213 = r216 * r213;
-            let r81 = r211.mul_add(r82, r81);
-            let r213 = r213 * r215;
-            let r81 = select(lit(1e-6).lt(r214), r81, lit(0.0));
-            let r205 = (-r207).mul_add(r213, r205);
-            let r81 = r216 * r81;
-            let r205 = r201 * r205;
-            let r215 = r81 * r215;
-            let r205 = select(r198.ge(lit(0.5)), r205, lit(0.0));
-            let r205 = r75 * r205;
-            let r205 = r74 * r205;
-            let r81 = r194 * r15;
-            let r81 = (-r193).mul_add(r16, r81);
-            let r213 = r193 * r17;
-            let r213 = (-r196).mul_add(r15, r213);
-            let r193 = r193 * r15;
-            let r214 = r196 * r16;
-            let r214 = (-r194).mul_add(r17, r214);
-            let r214 = r197 * r214;
-            let r193 = r194.mul_add(r16, r193);
-            let r214 = r199.mul_add(r213, r214);
-            let r193 = r196.mul_add(r17, r193);
-            let r214 = r204.mul_add(r81, r214);
-            let r193 = r203 * r193;
-            let r193 = lit(2.0) * r193;
-            let r193 = r40 * r193;
-            let r193 = lit(2.0).mul_add(r214, r193);
-            let r195 = r193 * r195;
-            let r195 = select(r198.ge(lit(0.5)), r195, lit(0.0));
-            let r195 = r200 * r195;
-            let r195 = lit(6.283185307179586) * r195;
-            let r195 = r207 * r195;
-            let r206 = r195 * r206;
-            let r206 = r216 * r206;
-            let r206 = -r206;
-            let r206 = (-r207).mul_add(r215, r206);
-            let r206 = r201 * r206;
-            let r206 = select(r198.ge(lit(0.5)), r206, lit(0.0));
-            let r206 = r75 * r206;
-            let r206 = lit(0.3183098861837907) * r206;
-            let r206 = lit(0.3183098861837907).mul_add(r217, r206);
-            let r206 = r74 * r206;
-            let r74 = r0 * r1;
-            let r74 = lit(2.0) * r74;
-            let r74 = r158 * r74;
-            let r74 = lit(0.5) * r74;
-            let r217 = unary(Unary::Reciprocal, r56);
-            let r63 = r63 * r217;
-            let r217 = r74 * r217;
-            let r74 = r54 * r67;
-            let r74 = lit(2.0) * r74;
-            let r74 = r158 * r74;
-            let r74 = lit(0.5) * r74;
-            let r158 = unary(Unary::Reciprocal, r50);
-            let r48 = r48 * r158;
-            let r1 = r50 * r1;
-            let r48 = r0 * r48;
-            let r158 = r74 * r158;
-            let r48 = r54.mul_add(r63, r48);
-            let r1 = r0.mul_add(r158, r1);
-            let r48 = select(lit(1e-6).lt(r41), r48, lit(0.0));
-            let r1 = r56.mul_add(r67, r1);
-            let r48 = r221 * r48;
-            let r1 = r54.mul_add(r217, r1);
-            let r48 = r48 * r51;
-            let r1 = select(lit(1e-6).lt(r41), r1, lit(0.0));
-            let r12 = (-r29).mul_add(r48, r12);
-            let r1 = r221 * r1;
-            let r12 = r138 * r12;
-            let r51 = r1 * r51;
-            let r12 = select(r220.ge(lit(0.5)), r12, lit(0.0));
-            let r12 = r73 * r12;
-            let r12 = r72 * r12;
-            let r1 = u(176) * r12;
-            let r1 = u(177).mul_add(r205, r1);
-            let r1 = u(178).mul_add(r179, r1);
-            let r1 = u(179).mul_add(r152, r1);
-            let r1 = r123.mul_add(r58, r1);
-            let r136 = r34.mul_add(r1, r136);
-            put(18, i, r136);
-            let r61 = r1.mul_add(r35, r61);
-            put(21, i, r61);
-            let r1 = r12 * u(180);
-            let r1 = r205.mul_add(u(181), r1);
-            let r12 = r12 * u(182);
-            let r1 = r179.mul_add(u(183), r1);
-            let r12 = r205.mul_add(u(184), r12);
-            let r1 = r152.mul_add(u(185), r1);
-            let r12 = r179.mul_add(u(186), r12);
-            let r1 = r228.mul_add(r104, r1);
-            let r12 = r152.mul_add(u(187), r12);
-            let r85 = r34.mul_add(r1, r85);
-            put(19, i, r85);
-            let r12 = r95.mul_add(r223, r12);
-            let r128 = r34.mul_add(r12, r128);
-            put(20, i, r128);
-            let r39 = r1.mul_add(r35, r39);
-            put(22, i, r39);
-            let r33 = r12.mul_add(r35, r33);
-            put(23, i, r33);
-            let r35 = r10 * r15;
-            let r35 = (-r9).mul_add(r16, r35);
-            let r12 = r9 * r17;
-            let r12 = (-r11).mul_add(r15, r12);
-            let r15 = r9 * r15;
-            let r9 = r11 * r16;
-            let r9 = (-r10).mul_add(r17, r9);
-            let r9 = r13 * r9;
-            let r15 = r10.mul_add(r16, r15);
-            let r9 = r141.mul_add(r12, r9);
-            let r15 = r11.mul_add(r17, r15);
-            let r9 = r139.mul_add(r35, r9);
-            let r15 = r28 * r15;
-            let r15 = lit(2.0) * r15;
-            let r15 = r40 * r15;
-            let r15 = lit(2.0).mul_add(r9, r15);
-            let r219 = r15 * r219;
-            let r219 = select(r220.ge(lit(0.5)), r219, lit(0.0));
-            let r219 = r14 * r219;
-            let r219 = lit(6.283185307179586) * r219;
-            let r219 = r29 * r219;
-            let r143 = r219 * r143;
-            let r143 = r221 * r143;
-            let r143 = -r143;
-            let r143 = (-r29).mul_add(r51, r143);
-            let r143 = r138 * r143;
-            let r143 = select(r220.ge(lit(0.5)), r143, lit(0.0));
-            let r143 = r73 * r143;
-            let r143 = lit(0.3183098861837907) * r143;
-            let r143 = lit(0.3183098861837907).mul_add(r49, r143);
-            let r143 = r72 * r143;
-            let r72 = r143 * u(257);
-            let r72 = r206.mul_add(u(258), r72);
-            let r72 = r180.mul_add(u(259), r72);
-            let r72 = r153.mul_add(u(260), r72);
-            let r72 = u(204).mul_add(r132, r72);
-            let r72 = r228.mul_add(r77, r72);
-            put(13, i, r72);
-            let r77 = r143 * u(261);
-            let r77 = r206.mul_add(u(262), r77);
-            let r143 = r143 * u(263);
-            let r77 = r180.mul_add(u(264), r77);
-            let r143 = r206.mul_add(u(265), r143);
-            let r77 = r153.mul_add(u(266), r77);
-            let r143 = r180.mul_add(u(267), r143);
-            let r77 = u(219).mul_add(r133, r77);
-            let r143 = r153.mul_add(u(268), r143);
-            let r77 = r95.mul_add(r224, r77);
-            put(14, i, r77);
-            let r143 = u(134).mul_add(r44, r143);
-            let r143 = r123.mul_add(r71, r143);
-            put(12, i, r143);
+            let r55 = r99 * r55;
+            let r24 = r39 * r24;
+            let r111 = r36.mul_add(r105, r111);
+            let r41 = r41 - r55;
+            let r24 = lit(2.0) * r24;
+            let r39 = r39 * r39;
+            let r55 = r102.mul_add(r50, r55);
+            let r50 = r109 * r42;
+            let r50 = r52.mul_add(r112, r50);
+            let r50 = r114.mul_add(r65, r50);
+            let r50 = u(159) * r50;
+            let r112 = r110 * r42;
+            let r112 = r52.mul_add(r113, r112);
+            let r42 = r108 * r42;
+            let r112 = r123.mul_add(r65, r112);
+            let r42 = r52.mul_add(r111, r42);
+            let r112 = u(162) * r112;
+            let r42 = r104.mul_add(r65, r42);
+            let r42 = u(146) * r42;
+            let r65 = r34 * r55;
+            let r55 = r55 * r35;
+            let r111 = r108 * r65;
+            let r111 = r52.mul_add(r23, r111);
+            let r108 = r108 * r55;
+            let r108 = u(166).mul_add(r27, r108);
+            let r27 = r34 * r41;
+            let r111 = r104.mul_add(r27, r111);
+            let r41 = r41 * r35;
+            let r111 = u(146) * r111;
+            let r108 = r104.mul_add(r41, r108);
+            let r108 = u(146) * r108;
+            let r104 = r109 * r65;
+            let r104 = r52.mul_add(r8, r104);
+            let r65 = r110 * r65;
+            let r109 = r109 * r55;
+            let r104 = r114.mul_add(r27, r104);
+            let r65 = r52.mul_add(r33, r65);
+            let r109 = u(166).mul_add(r26, r109);
+            let r55 = r110 * r55;
+            let r104 = u(159) * r104;
+            let r65 = r123.mul_add(r27, r65);
+            let r109 = r114.mul_add(r41, r109);
+            let r55 = u(166).mul_add(r25, r55);
+            let r65 = u(162) * r65;
+            let r109 = u(159) * r109;
+            let r55 = r123.mul_add(r41, r55);
+            let r55 = u(162) * r55;
+            let r41 = select(r73.lt(lit(1.0)), r63, lit(0.0));
+            let r123 = select(lit(1e-24).lt(r72), r41, lit(0.0));
+            let r123 = lit(0.5) * r123;
+            let r41 = lit(8.0) * r41;
+            let r72 = r72 * lit(8.0);
+            let r71 = r123 / r71;
+            let r123 = r70 * r71;
+            let r123 = r123 * lit(-2.0);
+            let r25 = lit(4.0) * r71;
+            let r25 = (-r68).mul_add(r123, r25);
+            let r69 = r25 * r69;
+            let r25 = binary(Binary::Less, lit(0.0), r0);
+            let r123 = lit(1.0) - r39;
+            let r114 = lit(0.5) * r69;
+            let mut made = [[lit(0.0); 6]; 4];
+            for m in 0..4 {
+                let r27 = samples([13, 14, 15, 16][m]);
+                let r110 = r12 * own(m, 0);
+                let r110 = r13.mul_add(own(m, 1), r110);
+                let r110 = r14.mul_add(own(m, 2), r110);
+                let r26 = lit(0.0).max(r110);
+                let r33 = r27 * r26;
+                let r52 = select(lit(0.0).lt(r110), r25, lit(0.0));
+                let r8 = own(m, 2) - r11;
+                let r23 = own(m, 1) - r10;
+                let r113 = own(m, 0) - r9;
+                let r102 = r113 * r113;
+                let r102 = r23.mul_add(r23, r102);
+                let r102 = r8.mul_add(r8, r102);
+                let r105 = binary(Binary::Less, lit(1e-12), r102);
+                let r105 = select(r52.ge(lit(0.5)), r105, lit(0.0));
+                let r102 = select(r105.ge(lit(0.5)), r102, lit(1.0));
+                let r52 = r102.sqrt();
+                let r52 = lit(0.5) * r52;
+                let r52 = select(r105.ge(lit(0.5)), r52, lit(1.0));
+                let r36 = r52.mul_add(r52, r68);
+                let r36 = r36.sqrt();
+                let r99 = r52 + r36;
+                let r98 = r99.max(lit(0.1));
+                let r96 = r70 * r98;
+                let r100 = r96 * r96;
+                let r103 = r100 * r100;
+                let r103 = unary(Unary::Reciprocal, r103);
+                let r101 = r72 * r103;
+                let r44 = r52.mul_add(r98, lit(-1.0));
+                let r97 = unary(Unary::Reciprocal, r98);
+                let r95 = r68 * r97;
+                let r92 = r52.mul_add(r95, lit(1.0));
+                let r92 = unary(Unary::Reciprocal, r92);
+                let r44 = r44 * r92;
+                let r89 = r44.mul_add(r44, lit(1.0));
+                let r94 = r101 * r89;
+                let r94 = select(r73.lt(lit(1.0)), r94, lit(1.0));
+                let r85 = r12 * r23;
+                let r85 = (-r13).mul_add(r113, r85);
+                let r93 = r14 * r113;
+                let r93 = (-r12).mul_add(r8, r93);
+                let r91 = r12 * r113;
+                let r91 = r13.mul_add(r23, r91);
+                let r91 = r14.mul_add(r8, r91);
+                let r90 = r91 * r91;
+                let r20 = r13 * r8;
+                let r20 = (-r14).mul_add(r23, r20);
+                let r22 = r20 * r20;
+                let r22 = r39.mul_add(r90, r22);
+                let r22 = r93.mul_add(r93, r22);
+                let r22 = r85.mul_add(r85, r22);
+                let r102 = unary(Unary::Reciprocal, r102);
+                let r22 = r22 * r102;
+                let r22 = select(r105.ge(lit(0.5)), r22, lit(1.0));
+                let r21 = lit(3.141592653589793) * r22;
+                let r21 = r22 * r21;
+                let r21 = unary(Unary::Reciprocal, r21);
+                let r84 = r39 * r21;
+                let r53 = select(r105.ge(lit(0.5)), r110, lit(1.0));
+                let r83 = select(r105.ge(lit(0.5)), r0, lit(1.0));
+                let r80 = r83 * r83;
+                let r88 = r123.mul_add(r80, r39);
+                let r88 = r88.sqrt();
+                let r82 = r53 * r53;
+                let r86 = r123.mul_add(r82, r39);
+                let r86 = r86.sqrt();
+                let r87 = r83 * r86;
+                let r87 = r53.mul_add(r88, r87);
+                let r81 = lit(1e-6).max(r87);
+                let r81 = unary(Unary::Reciprocal, r81);
+                let r5 = lit(0.5) * r81;
+                let r3 = r84 * r5;
+                let r19 = r94 * r3;
+                let r19 = select(r105.ge(lit(0.5)), r19, lit(0.0));
+                let r6 = r26 * r19;
+                let r6 = r27 * r6;
+                let r4 = own(m, 0) * r15;
+                let r4 = own(m, 1).mul_add(r16, r4);
+                let r4 = own(m, 2).mul_add(r17, r4);
+                let r110 = select(lit(0.0).lt(r110), r4, lit(0.0));
+                let r18 = r27 * r110;
+                let r2 = r23 * r15;
+                let r2 = (-r113).mul_add(r16, r2);
+                let r7 = r113 * r17;
+                let r7 = (-r8).mul_add(r15, r7);
+                let r60 = r8 * r16;
+                let r60 = (-r23).mul_add(r17, r60);
+                let r60 = r20 * r60;
+                let r60 = r93.mul_add(r7, r60);
+                let r60 = r85.mul_add(r2, r60);
+                let r113 = r113 * r15;
+                let r113 = r23.mul_add(r16, r113);
+                let r113 = r8.mul_add(r17, r113);
+                let r113 = r91 * r113;
+                let r113 = lit(2.0) * r113;
+                let r113 = r39 * r113;
+                let r113 = lit(2.0).mul_add(r60, r113);
+                let r113 = r113 * r102;
+                let r113 = select(r105.ge(lit(0.5)), r113, lit(0.0));
+                let r113 = r22 * r113;
+                let r113 = lit(6.283185307179586) * r113;
+                let r113 = r84 * r113;
+                let r113 = r113 * r21;
+                let r4 = select(r105.ge(lit(0.5)), r4, lit(0.0));
+                let r60 = select(r105.ge(lit(0.5)), r1, lit(0.0));
+                let r91 = r83 * r60;
+                let r91 = lit(2.0) * r91;
+                let r91 = r123 * r91;
+                let r91 = lit(0.5) * r91;
+                let r8 = unary(Unary::Reciprocal, r88);
+                let r91 = r91 * r8;
+                let r23 = r53 * r4;
+                let r23 = lit(2.0) * r23;
+                let r23 = r123 * r23;
+                let r23 = lit(0.5) * r23;
+                let r2 = unary(Unary::Reciprocal, r86);
+                let r23 = r23 * r2;
+                let r23 = r83 * r23;
+                let r23 = r53.mul_add(r91, r23);
+                let r23 = r86.mul_add(r60, r23);
+                let r23 = r88.mul_add(r4, r23);
+                let r23 = select(lit(1e-6).lt(r87), r23, lit(0.0));
+                let r23 = r5 * r23;
+                let r23 = r23 * r81;
+                let r23 = r84 * r23;
+                let r23 = -r23;
+                let r23 = (-r5).mul_add(r113, r23);
+                let r23 = r94 * r23;
+                let r23 = select(r105.ge(lit(0.5)), r23, lit(0.0));
+                let r23 = r26 * r23;
+                let r110 = r19 * r110;
+                let r110 = lit(0.3183098861837907) * r110;
+                let r110 = lit(0.3183098861837907).mul_add(r23, r110);
+                let r110 = r27 * r110;
+                let r80 = lit(1.0) - r80;
+                let r80 = r24 * r80;
+                let r80 = lit(0.5) * r80;
+                let r8 = r80 * r8;
+                let r82 = lit(1.0) - r82;
+                let r82 = r24 * r82;
+                let r82 = lit(0.5) * r82;
+                let r2 = r82 * r2;
+                let r2 = r83 * r2;
+                let r2 = r53.mul_add(r8, r2);
+                let r2 = select(lit(1e-6).lt(r87), r2, lit(0.0));
+                let r2 = r5 * r2;
+                let r81 = r2 * r81;
+                let r90 = r90 * r24;
+                let r102 = r90 * r102;
+                let r102 = select(r105.ge(lit(0.5)), r102, lit(0.0));
+                let r102 = r22 * r102;
+                let r102 = lit(6.283185307179586) * r102;
+                let r102 = (-r84).mul_add(r102, r24);
+                let r21 = r102 * r21;
+                let r21 = r5 * r21;
+                let r21 = (-r84).mul_add(r81, r21);
+                let r21 = r94 * r21;
+                let r21 = select(r105.ge(lit(0.5)), r21, lit(0.0));
+                let r21 = r26 * r21;
+                let r21 = r27 * r21;
+                let r36 = r114 / r36;
+                let r36 = select(lit(0.1).lt(r99), r36, lit(0.0));
+                let r95 = (-r95).mul_add(r36, r69);
+                let r97 = r95 * r97;
+                let r97 = (-r44).mul_add(r97, r36);
+                let r97 = r52 * r97;
+                let r92 = r97 * r92;
+                let r92 = r44 * r92;
+                let r92 = lit(2.0) * r92;
+                let r36 = r70 * r36;
+                let r36 = (-r98).mul_add(r71, r36);
+                let r36 = r96 * r36;
+                let r36 = lit(2.0) * r36;
+                let r36 = r100 * r36;
+                let r36 = lit(2.0) * r36;
+                let r36 = (-r101).mul_add(r36, r41);
+                let r103 = r36 * r103;
+                let r103 = r89 * r103;
+                let r103 = r101.mul_add(r92, r103);
+                let r103 = select(r73.lt(lit(1.0)), r103, lit(0.0));
+                let r103 = r3 * r103;
+                let r103 = select(r105.ge(lit(0.5)), r103, lit(0.0));
+                let r103 = r26 * r103;
+                let r103 = r27 * r103;
+                made[m] = [r33, r6, r18, r110, r21, r103];
+            }
+            let [r33, r6, r18, r110, r21, r103] = made[0];
+            let [r3, r59, r54, r26, r80, r99] = made[1];
+            let [r93, r126, r43, r105, r4, r44] = made[2];
+            let [r87, r98, r88, r96, r95, r85] = made[3];
+            let r28 = (-r33).mul_add(u(174), r28);
+            let r78 = u(175).mul_add(r18, r78);
+            let r50 = r110.mul_add(u(176), r50);
+            let r122 = (-r33).mul_add(u(177), r122);
+            let r79 = u(178).mul_add(r18, r79);
+            let r112 = r110.mul_add(u(179), r112);
+            let r107 = u(180).mul_add(r103, r107);
+            let r116 = u(181).mul_add(r103, r116);
+            let r28 = (-r3).mul_add(u(182), r28);
+            let r78 = u(183).mul_add(r54, r78);
+            let r50 = r26.mul_add(u(184), r50);
+            let r122 = (-r3).mul_add(u(185), r122);
+            let r79 = u(186).mul_add(r54, r79);
+            let r112 = r26.mul_add(u(187), r112);
+            let r107 = u(188).mul_add(r99, r107);
+            let r116 = u(189).mul_add(r99, r116);
+            let r125 = u(190).mul_add(r103, r125);
+            let r77 = u(191).mul_add(r18, r77);
+            let r42 = r110.mul_add(u(192), r42);
+            let r28 = (-r93).mul_add(u(193), r28);
+            let r78 = u(194).mul_add(r43, r78);
+            let r50 = r105.mul_add(u(195), r50);
+            let r122 = (-r93).mul_add(u(196), r122);
+            let r79 = u(197).mul_add(r43, r79);
+            let r112 = r105.mul_add(u(198), r112);
+            let r107 = u(199).mul_add(r44, r107);
+            let r116 = u(200).mul_add(r44, r116);
+            let r125 = u(201).mul_add(r99, r125);
+            let r77 = u(202).mul_add(r54, r77);
+            let r42 = r26.mul_add(u(203), r42);
+            let r28 = (-r87).mul_add(u(204), r28);
+            let r78 = u(205).mul_add(r88, r78);
+            let r50 = r96.mul_add(u(206), r50);
+            let r122 = (-r87).mul_add(u(207), r122);
+            let r79 = u(208).mul_add(r88, r79);
+            let r112 = r96.mul_add(u(209), r112);
+            let r107 = u(210).mul_add(r85, r107);
+            let r116 = u(211).mul_add(r85, r116);
+            let r125 = u(212).mul_add(r44, r125);
+            let r77 = u(213).mul_add(r43, r77);
+            let r42 = r105.mul_add(u(214), r42);
+            let r78 = r32 * r78;
+            let r79 = r118 * r79;
+            let r31 = r28 * r31;
+            let r119 = r122 * r119;
+            let r61 = r28 * r61;
+            let r62 = r122 * r62;
+            let r125 = u(215).mul_add(r85, r125);
+            let r77 = u(216).mul_add(r88, r77);
+            let r42 = r96.mul_add(u(217), r42);
+            let r78 = r106.mul_add(r28, r78);
+            let r79 = r117.mul_add(r122, r79);
+            let r78 = r30 * r78;
+            let r79 = r120 * r79;
+            let r29 = r28 * r29;
+            let r121 = r122 * r121;
+            let r30 = r32 * r30;
+            let r120 = r118 * r120;
+            let r122 = samples(22);
+            let r50 = r122.mul_add(r78, r50);
+            put(13, i, r50);
+            let r78 = samples(25);
+            let r112 = r78.mul_add(r79, r112);
+            put(14, i, r112);
+            let r79 = r6.mul_add(u(218), r40);
+            let r79 = r59.mul_add(u(219), r79);
+            let r40 = u(146) * r40;
+            let r79 = r126.mul_add(u(220), r79);
+            let r40 = u(180).mul_add(r6, r40);
+            let r79 = r98.mul_add(u(221), r79);
+            let r40 = u(188).mul_add(r59, r40);
+            let r40 = u(199).mul_add(r126, r40);
+            let r40 = u(210).mul_add(r98, r40);
+            let r28 = r6.mul_add(u(222), r115);
+            let r28 = r59.mul_add(u(223), r28);
+            let r115 = u(159) * r115;
+            let r28 = r126.mul_add(u(224), r28);
+            let r115 = r6.mul_add(u(181), r115);
+            let r28 = r98.mul_add(u(225), r28);
+            let r115 = r59.mul_add(u(189), r115);
+            let r28 = r122.mul_add(r31, r28);
+            put(16, i, r28);
+            let r115 = r126.mul_add(u(200), r115);
+            let r115 = r98.mul_add(u(211), r115);
+            let r31 = r6.mul_add(u(226), r124);
+            let r31 = r59.mul_add(u(227), r31);
+            let r124 = u(162) * r124;
+            let r31 = r126.mul_add(u(228), r31);
+            let r124 = r6.mul_add(u(190), r124);
+            let r31 = r98.mul_add(u(229), r31);
+            let r124 = r59.mul_add(u(201), r124);
+            let r31 = r78.mul_add(r119, r31);
+            put(17, i, r31);
+            let r124 = r126.mul_add(u(212), r124);
+            let r124 = r98.mul_add(u(215), r124);
+            let r98 = u(180) * r21;
+            let r98 = u(188).mul_add(r80, r98);
+            let r98 = u(199).mul_add(r4, r98);
+            let r98 = u(210).mul_add(r95, r98);
+            let r126 = u(181) * r21;
+            let r126 = u(189).mul_add(r80, r126);
+            let r21 = u(190) * r21;
+            let r126 = u(200).mul_add(r4, r126);
+            let r21 = u(201).mul_add(r80, r21);
+            let r126 = u(211).mul_add(r95, r126);
+            let r21 = u(212).mul_add(r4, r21);
+            let r126 = r122.mul_add(r61, r126);
+            let r21 = u(215).mul_add(r95, r21);
+            let r104 = r34.mul_add(r126, r104);
+            put(19, i, r104);
+            let r21 = r78.mul_add(r62, r21);
+            let r65 = r34.mul_add(r21, r65);
+            put(20, i, r65);
+            let r109 = r126.mul_add(r35, r109);
+            put(22, i, r109);
+            let r55 = r21.mul_add(r35, r55);
+            put(23, i, r55);
+            let r21 = r63 * r122;
+            let r116 = r21.mul_add(r29, r116);
+            put(25, i, r116);
+            let r29 = r63 * r78;
+            let r125 = r29.mul_add(r121, r125);
+            put(26, i, r125);
+            let r121 = r33.mul_add(u(191), r74);
+            let r121 = r3.mul_add(u(202), r121);
+            let r74 = u(148) * r74;
+            let r121 = r93.mul_add(u(213), r121);
+            let r74 = r33.mul_add(u(230), r74);
+            let r121 = r87.mul_add(u(216), r121);
+            let r74 = r3.mul_add(u(231), r74);
+            let r74 = r93.mul_add(u(232), r74);
+            let r74 = r87.mul_add(u(233), r74);
+            let r29 = r64 * r67;
+            let r29 = r29 * r121;
+            let r21 = samples(0);
+            let r40 = r21.mul_add(r29, r40);
+            put(0, i, r40);
+            let r63 = r21 * r63;
+            let r29 = r33.mul_add(u(175), r75);
+            let r29 = r3.mul_add(u(183), r29);
+            let r75 = u(160) * r75;
+            let r29 = r93.mul_add(u(194), r29);
+            let r75 = r33.mul_add(u(234), r75);
+            let r29 = r87.mul_add(u(205), r29);
+            let r75 = r3.mul_add(u(235), r75);
+            let r30 = r30 * r29;
+            let r75 = r93.mul_add(u(236), r75);
+            let r115 = r122.mul_add(r30, r115);
+            put(1, i, r115);
+            let r75 = r87.mul_add(u(237), r75);
+            let r30 = r33.mul_add(u(178), r76);
+            let r30 = r3.mul_add(u(186), r30);
+            let r76 = u(163) * r76;
+            let r30 = r93.mul_add(u(197), r30);
+            let r76 = r33.mul_add(u(238), r76);
+            let r30 = r87.mul_add(u(208), r30);
+            let r76 = r3.mul_add(u(239), r76);
+            let r57 = (-r33).mul_add(u(240), r57);
+            let r120 = r120 * r30;
+            let r76 = r93.mul_add(u(241), r76);
+            let r57 = (-r3).mul_add(u(242), r57);
+            let r124 = r78.mul_add(r120, r124);
+            put(2, i, r124);
+            let r76 = r87.mul_add(u(243), r76);
+            let r57 = (-r93).mul_add(u(244), r57);
+            let r57 = (-r87).mul_add(u(245), r57);
+            let r66 = r57 * r66;
+            let r56 = r57 * r56;
+            let r58 = r57 * r58;
+            let r79 = r21.mul_add(r66, r79);
+            put(15, i, r79);
+            let r98 = r21.mul_add(r56, r98);
+            let r107 = r63.mul_add(r58, r107);
+            put(24, i, r107);
+            let r111 = r34.mul_add(r98, r111);
+            put(18, i, r111);
+            let r108 = r98.mul_add(r35, r108);
+            put(21, i, r108);
+            let r35 = r118 * r30;
+            let r35 = r78 * r35;
+            put(5, i, r35);
+            let r98 = r38 * r118;
+            let r98 = r30 * r98;
+            let r118 = r118 * r37;
+            let r98 = r78 * r98;
+            put(8, i, r98);
+            let r118 = r76 * r118;
+            let r118 = r78 * r118;
+            put(11, i, r118);
+            let r78 = r64 * r121;
+            let r78 = r21 * r78;
+            put(3, i, r78);
+            let r76 = r32 * r29;
+            let r76 = r122 * r76;
+            put(4, i, r76);
+            let r30 = r64 * r38;
+            let r30 = r121 * r30;
+            let r38 = r38 * r32;
+            let r30 = r21 * r30;
+            put(6, i, r30);
+            let r38 = r29 * r38;
+            let r38 = r122 * r38;
+            put(7, i, r38);
+            let r29 = r64 * r37;
+            let r29 = r74 * r29;
+            let r37 = r32 * r37;
+            let r77 = r64 * r77;
+            let r29 = r21 * r29;
+            put(9, i, r29);
+            let r37 = r75 * r37;
+            let r77 = r51.mul_add(r57, r77);
+            let r37 = r122 * r37;
+            put(10, i, r37);
+            let r77 = r67 * r77;
+            let r42 = r21.mul_add(r77, r42);
+            put(12, i, r42);
+            }
         }
         },
     );
