@@ -2,7 +2,6 @@
 
 use super::lanes::{HalfLanes, Lanes};
 use super::part::{Part, shorter_than_rows};
-use crate::samples::LANES;
 use crate::samples::rows::Row;
 use crate::simd::Simd;
 
@@ -115,6 +114,7 @@ impl<C: Source> Tile<C> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::samples::LANES;
     use crate::simd::{Level, levels, name};
     use crate::with_simd;
 
