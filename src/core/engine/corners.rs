@@ -39,9 +39,9 @@ pub(super) trait Lookup: Real {
     /// Of each channel the left and the right texels of each lane's lookup, blended between its rows by `fy`.
     fn blended_rows(self, texels: &[[f32; 4]], row: usize, fy: Self) -> [[Self; 2]; 4];
 
-    /// Numbers that stand in memory from here on, where indices are checked. Each check of an index ends a block of instructions, and the compiler moves
-    /// what is made of texels down to the block where it is read: behind the texels of all lookups, each of which would be held
-    /// meanwhile, sixteen registers where four will do.
+    /// Numbers that stand in memory from here on, where indices are checked and not bounded. Each check ends a block of
+    /// instructions, and the compiler moves what is made of texels down to the block where it is read: behind the texels of all
+    /// lookups, each of which would be held meanwhile, sixteen registers where four will do.
     fn made_here<const N: usize>(numbers: [Self; N]) -> [Self; N];
 }
 
@@ -177,7 +177,8 @@ fn both_rows(texels: &[[f32; 4]], row: usize) -> (&[f32], &[f32]) {
     (&numbers[..count], &numbers[4 * row..][..count])
 }
 
-/// [`Lookup::blended_rows`] of sixteen lanes in shorter registers, four lanes at a time: the texels of more do not fit into registers.
+/// [`Lookup::blended_rows`] of sixteen lanes in shorter registers, four lanes at a time: the texels of more do not fit into
+/// registers.
 #[inline(always)]
 fn blended_by_fours<S: Simd>(
     at: Lanes<S>,

@@ -28,7 +28,6 @@ pub enum Family {
 #[must_use]
 pub fn families(graph: &Graph, kept: &[Family]) -> Vec<Family> {
     let mut found: Vec<Family> = Vec::with_capacity(graph.len());
-    // The same for every member: kinds of kept numbers and of inputs are by their names, of others by the operation.
     for id in graph.ids() {
         let of_input = |input: &Input| match input.name.as_str() {
             KEPT => kept.get(input.component).copied().unwrap_or(Family::Shared),

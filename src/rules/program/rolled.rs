@@ -1,7 +1,7 @@
 //! What is computed alike for each member of a family, to be written once, as a loop.
 //!
 //! Four lights of the sky are the same instructions four times over, each with numbers of its own. Written out they are more
-//! than the nearest cache of instructions holds, and take the compiler as much longer.
+//! than the nearest cache of instructions holds, and take the compiler longer.
 
 use std::collections::HashSet;
 
@@ -22,7 +22,8 @@ pub(super) struct Bodies {
     pub(super) uniforms: Vec<Vec<Operand>>,
 }
 
-/// The instructions of `graph`'s nodes that are alike; `families` says of nodes what they are of, `varies` whether they differ between samples.
+/// The instructions of `graph`'s nodes that are alike; `families` says of nodes what they are of, `varies` whether they differ
+/// between samples.
 pub(super) fn bodies(
     graph: &Graph,
     drafts: &[Draft],

@@ -81,7 +81,7 @@ fn function(name: &str, tape: &Tape) -> String {
     text
 }
 
-/// What a tape's function computes with: a part of a row where it is long. Short ones have registers enough, and do in one go what
+/// What a tape's function computes with: a part of a row where it has a loop, and so is long. Short ones have registers enough, and do in one go what
 /// is the same for all samples.
 const fn part(tape: &Tape) -> &'static str {
     if own(tape).is_some() { "R" } else { "Lanes<S>" }
