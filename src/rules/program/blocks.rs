@@ -82,11 +82,13 @@ fn loop_of(drafts: &mut [Option<Draft>], wanted: &[Operand], bodies: &Bodies) ->
     Block { shown: drafts.len(), drafts }
 }
 
-/// The blocks that do not depend on what is written, and those that do.
+/// The blocks that do not depend on what is written, and those that do: they read of it, or write over what such a block writes
+/// where it stands in.
 fn apart(blocks: Vec<Block>, written: Vec<Operand>) -> (Vec<Block>, Vec<Block>) {
     let mut written: std::collections::HashSet<Operand> = written.into_iter().collect();
     blocks.into_iter().partition(|block| {
-        let depends = block.drafts.iter().flat_map(|draft| &draft.reads).any(|read| written.contains(read));
+        let mut operands = block.drafts.iter().flat_map(|draft| draft.reads.iter().chain(&draft.writes));
+        let depends = operands.any(|operand| written.contains(operand));
         if depends {
             written.extend(block.drafts.iter().flat_map(|draft| &draft.writes));
         }

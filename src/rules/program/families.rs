@@ -100,8 +100,7 @@ pub(super) const fn commuting(op: Binary) -> usize {
 
 /// The number that stands in a name between underscores, with what stands before and behind it.
 pub(super) fn numbered(name: &str) -> Option<(&str, u32, &str)> {
-    let places = name.match_indices('_').map(|(at, _)| at);
-    places.into_iter().find_map(|at| {
+    name.match_indices('_').find_map(|(at, _)| {
         let rest = &name[at + 1..];
         let (word, behind) = rest.split_once('_').unwrap_or((rest, ""));
         Some((&name[..at], word.parse().ok()?, behind))
