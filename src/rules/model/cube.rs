@@ -48,10 +48,18 @@ pub fn texel_direction(face: usize, column: usize, row: usize, size: usize) -> [
 #[must_use]
 #[inline]
 pub fn texel_solid_angle(column: usize, row: usize, size: usize) -> f64 {
+    let corner = |i: usize, j: usize| corner_solid_angle(column + i, row + j, size);
+    corner(1, 1) - corner(0, 1) - corner(1, 0) + corner(0, 0)
+}
+
+/// The solid angle of the rectangle between a face's middle and the corner (column, row) of its `size` x `size` texels, in
+/// steradians; negative in two of the four quarters. A texel's is what those of its four corners differ by.
+#[must_use]
+#[inline]
+pub fn corner_solid_angle(column: usize, row: usize, size: usize) -> f64 {
     let edge = |i: usize| 2.0 * i as f64 / size as f64 - 1.0;
-    let corner = |x: f64, y: f64| (x * y).atan2((x * x + y * y + 1.0).sqrt());
-    let (x0, x1, y0, y1) = (edge(column), edge(column + 1), edge(row), edge(row + 1));
-    corner(x1, y1) - corner(x0, y1) - corner(x1, y0) + corner(x0, y0)
+    let (x, y) = (edge(column), edge(row));
+    (x * y).atan2((x * x + y * y + 1.0).sqrt())
 }
 
 /// Where a direction meets the cube: cubes of any size can be looked up there.

@@ -137,7 +137,7 @@ fn operation(graph: &Graph, kind: &Kind) -> (String, usize) {
 #[cfg(test)]
 mod tests {
     use crate::program::evaluate::Shared;
-    use crate::program::graph::{Binary, Graph, Id, Input, Unary};
+    use crate::program::graph::{Binary, Graph, Id, Input, Native, Unary};
     use crate::program::print::statements;
     use crate::program::tape::Tape;
 
@@ -161,7 +161,10 @@ mod tests {
     }
 
     fn run(tape: &Tape) -> Vec<u64> {
-        let number = |input: &Input| 0.3 + input.name.bytes().map(f64::from).sum::<f64>() / 1e4;
+        let number = |input: &Input| match input.name.as_str() {
+            "nothing" => 0.0,
+            name => 0.3 + name.bytes().map(f64::from).sum::<f64>() / 1e4,
+        };
         let shared = Shared { uniforms: tape.uniform_values(number), cubes: Vec::new() };
         tape.run(&shared, 0.0_f64, number).into_iter().map(f64::to_bits).collect()
     }
@@ -179,6 +182,25 @@ mod tests {
             text.contains("] = made[2];")
                 && !statements(&plain, "", |_, _| String::new()).0.contains("for m")
         );
+    }
+
+    #[test]
+    fn what_stands_in_behind_a_loop_may_divide_by_what_others_divide_by() {
+        let (mut graph, outputs) = lit(3, 8);
+        let nothing = graph.field("nothing", 0);
+        let [a, b, c] = ["a", "b", "c"].map(|name| graph.field(name, 0));
+        // Of no direction, as it is of the loop's sum times nothing: a quotient stands in.
+        let none = graph.binary(Binary::Multiply, outputs[0], nothing);
+        let stands_in = graph.binary(Binary::Divide, a, b);
+        let unit = graph.call(Native::Unit, vec![none, none, none, stands_in, a, c], Vec::new());
+        // Every sample asks for one over b, too.
+        let other = graph.binary(Binary::Divide, c, b);
+        let outputs: Vec<Id> = unit.into_iter().chain([other]).collect();
+        let rolled = Tape::with_few_registers(&graph, &outputs, &[]);
+        assert!(rolled.rolled.is_some());
+        let found = run(&rolled);
+        assert_eq!(found, run(&Tape::new(&graph, &outputs)));
+        assert!(found.iter().all(|bits| f64::from_bits(*bits) > 0.0), "{found:?}");
     }
 
     #[test]

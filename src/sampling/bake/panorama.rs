@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use rayon::prelude::*;
 
-use crate::model::cube::{Cube, face_direction, texel_direction, texel_solid_angle};
+use crate::model::cube::{Cube, corner_solid_angle, face_direction, texel_direction};
 use crate::scene::maps::{Environment, Map};
 
 /// Panoramas wider than this are first reduced, unless the cube that is made of them is finer: a texel of 0.18
@@ -37,8 +37,9 @@ pub fn sample_latlong<const C: usize>(
     let y = (v * height as f64 - 0.5).clamp(0.0, (height - 1) as f64);
     let row = (y as usize).min(height.saturating_sub(2));
     let (fx, fy, below) = (x - x.floor(), y - row as f64, (row + 1).min(height - 1));
-    let left = (x.floor() as i64).rem_euclid(width as i64) as usize;
-    let right = (left + 1) % width;
+    // As u is from 0 to 1, half a texel beyond the first or the last column at most, where they wrap.
+    let left = if x < 0.0 { width - 1 } else { x as usize };
+    let right = if left + 1 < width { left + 1 } else { 0 };
     let (a, b, c, d) = (texel(left, row), texel(right, row), texel(left, below), texel(right, below));
     std::array::from_fn(|i| {
         let top = a[i] * (1.0 - fx) + b[i] * fx;
@@ -75,9 +76,16 @@ fn mean_over(
 ) -> ([f64; 3], f64) {
     let (mut sum, mut weights) = ([0.0; 3], 0.0);
     let (mut least, mut most) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    let columns = column * sub..(column + 1) * sub;
+    // Cells share corners, each of which costs an arc tangent.
+    let corners = |y: usize| -> Vec<f64> {
+        (columns.start..=columns.end).map(|x| corner_solid_angle(x, y, size * sub)).collect()
+    };
+    let mut above = corners(row * sub);
     for y in row * sub..(row + 1) * sub {
-        for x in column * sub..(column + 1) * sub {
-            let weight = texel_solid_angle(x, y, size * sub);
+        let below = corners(y + 1);
+        for (x, i) in columns.clone().zip(0..) {
+            let weight = below[i + 1] - below[i] - above[i + 1] + above[i];
             let value = lookup(cell_direction(face, x, y, size * sub));
             for c in 0..3 {
                 sum[c] += weight * value[c];
@@ -86,6 +94,7 @@ fn mean_over(
             }
             weights += weight;
         }
+        above = below;
     }
     let apart = (0..3).map(|c| most[c] - least[c]).fold(0.0, f64::max);
     (sum.map(|s| s / weights), apart)
@@ -216,6 +225,7 @@ fn halve(map: &Map<3>) -> Map<3> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::cube::texel_solid_angle;
     use crate::scene::maps::Spots;
 
     /// A panorama whose colour is its direction.
