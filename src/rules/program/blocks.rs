@@ -82,8 +82,8 @@ fn loop_of(drafts: &mut [Option<Draft>], wanted: &[Operand], bodies: &Bodies) ->
     Block { shown: drafts.len(), drafts }
 }
 
-/// The blocks that do not depend on what is written, and those that do: they read of it, or write what one of them writes, too,
-/// which is written for all behind where it stands in.
+/// The blocks that do not depend on what is written, and those that do: they read of it, or write what one of these writes, too:
+/// what is written where something stands in is written for all once more.
 fn apart(blocks: Vec<Block>, written: Vec<Operand>) -> (Vec<Block>, Vec<Block>) {
     let mut written: std::collections::HashSet<Operand> = written.into_iter().collect();
     blocks.into_iter().partition(|block| {
