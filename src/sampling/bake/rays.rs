@@ -113,6 +113,11 @@ impl RayMesh {
         Self { cutouts, ..Self::new(&mesh.positions, &mesh.triangles) }
     }
 
+    /// The triangles that can be hit, by their indices in the mesh, which rise.
+    pub(crate) fn triangles(&self) -> &[u32] {
+        &self.index
+    }
+
     /// The hierarchy for packets of rays.
     pub(crate) fn wide(&self) -> &WideBvh {
         self.wide.get_or_init(|| self.widened())

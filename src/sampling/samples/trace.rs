@@ -1,8 +1,10 @@
-//! Primary rays: which point of the mesh each stratified sample of each pixel sees.
+//! Primary rays: which point of the mesh each stratified sample of each pixel sees. Those of a pinhole that end at the first
+//! surface find it triangle by triangle (`raster`), the others by a hierarchy.
 
 use glam::{DVec3, Vec2, Vec3A};
 use rayon::prelude::*;
 
+use super::raster::{Raster, Scratch};
 use crate::bake::low_discrepancy::mix;
 use crate::bake::rays::RayMesh;
 use crate::scene::mesh::PosedMesh;
@@ -73,7 +75,7 @@ const MOST_HOLES: usize = 256;
 /// With corners a, b, c relative to the eye, the ray d passes edge ab on the side that the sign of
 /// d . (a x b) tells. Neighbours see exactly negated numbers, so no ray slips between them; the
 /// three numbers are the barycentric weights up to their sum, which is d . N.
-struct Seen {
+pub(super) struct Seen {
     /// b x c, c x a, a x b.
     edges: [DVec3; 3],
     /// a . N with N = (b - a) x (c - a): the distance along d is this over d . N.
@@ -81,20 +83,28 @@ struct Seen {
 }
 
 impl Seen {
-    fn new(mesh: &PosedMesh, triangle: [u32; 3], eye: DVec3) -> Self {
+    pub(super) fn new(mesh: &PosedMesh, triangle: [u32; 3], eye: DVec3) -> Self {
         let [a, b, c] = triangle.map(|i| mesh.positions[i as usize].as_dvec3() - eye);
         Self { edges: [b.cross(c), c.cross(a), a.cross(b)], volume: (b - a).cross(c - a).dot(a) }
     }
 
     /// Distance along `d` (in its lengths) and the three weights, where the ray passes through.
     #[inline(always)]
-    fn hit(&self, d: DVec3) -> Option<(f64, [f64; 3])> {
-        let weights = self.edges.map(|edge| edge.dot(d));
-        let [u, v, w] = weights;
+    pub(super) fn hit(&self, d: DVec3) -> Option<(f64, [f64; 3])> {
+        let [u, v, w] = self.edges.map(|edge| edge.dot(d));
         let inside = (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
         let sum = u + v + w;
+        if !inside || sum == 0.0 {
+            return None;
+        }
         let distance = self.volume / sum;
-        (inside && sum != 0.0 && distance > 0.0).then(|| (distance, weights.map(|x| x / sum)))
+        (distance > 0.0).then(|| (distance, [u / sum, v / sum, w / sum]))
+    }
+
+    /// The distance of the eye from the plane that it lies in.
+    pub(super) fn plane(&self) -> f64 {
+        let [u, v, w] = self.edges;
+        self.volume.abs() / (u + v + w).length()
     }
 }
 
@@ -141,6 +151,12 @@ impl CameraRays {
         }
     }
 
+    /// The directions of a pixel's `n x n` samples, at the centres of its strata, row by row.
+    pub(super) fn of_pixel(&self, [x, y]: [u32; 2], n: u32) -> impl Iterator<Item = DVec3> {
+        let at = move |i: u32| (f64::from(i) + 0.5) / f64::from(n);
+        (0..n * n).map(move |i| self.direction(f64::from(x) + at(i % n), f64::from(y) + at(i / n)))
+    }
+
     /// How the direction of a ray moves for a pixel right and down where it goes to `place`, from the eye: in its lengths
     /// of one unit along the camera's axis.
     pub(super) fn steps(&self, place: DVec3) -> [DVec3; 2] {
@@ -161,43 +177,80 @@ impl CameraRays {
 pub(super) fn trace(rays: &RayMesh, mesh: &PosedMesh, camera: &Camera, n: u32) -> Hits {
     let camera_rays = CameraRays::new(camera);
     let seen: Vec<Seen> = mesh.triangles.par_iter().map(|&t| Seen::new(mesh, t, camera_rays.eye)).collect();
-    let [columns, rows] = bounds(mesh, camera);
     let n = n.max(1);
-    let parts: Vec<Hits> = rows
-        .into_par_iter()
-        .map(|y| {
-            let mut part = Hits::default();
-            for x in columns.clone() {
-                let start = part.hits.len() as u32;
-                for i in 0..n * n {
-                    let at = |i: u32| (f64::from(i) + 0.5) / f64::from(n);
-                    let d = camera_rays.direction(f64::from(x) + at(i % n), f64::from(y) + at(i / n));
-                    let (turn, all) = (mix(y * camera.width + x) % (n * n), n * n);
-                    let cut = || (f64::from((i + turn) % all) + 0.5) / f64::from(all);
-                    match shown(rays, mesh, (camera_rays.eye, d), cut, |triangle, d| {
-                        seen[triangle as usize].hit(d)
-                    }) {
-                        Shown::Nothing => {}
-                        Shown::Skin(hit) => part.hits.push(hit),
-                        Shown::Plain(hit) => part.plain.push((y * camera.width + x, hit)),
-                    }
-                }
-                let end = part.hits.len() as u32;
-                if end > start {
-                    part.pixels.push((y * camera.width + x, start..end));
-                }
+    // Where all rays are straight and end at the first surface, triangles find their rays.
+    if mesh.plain.is_none()
+        && camera.lens.distortion.is_none()
+        && let Some(raster) = Raster::new(rays, mesh, (camera, &camera_rays), n, &seen)
+    {
+        let rows = (0..camera.height).into_par_iter();
+        let row = |scratch: &mut Scratch, y| raster.row(y, &camera_rays, &seen, scratch);
+        return joined(rows.map_init(Scratch::default, row).collect());
+    }
+    by_hierarchy(rays, mesh, camera, n, (&camera_rays, &seen))
+}
+
+/// The hits of all rows by the hierarchy.
+fn by_hierarchy(
+    rays: &RayMesh,
+    mesh: &PosedMesh,
+    camera: &Camera,
+    n: u32,
+    (camera_rays, seen): (&CameraRays, &[Seen]),
+) -> Hits {
+    let [columns, rows] = bounds(mesh, camera);
+    let row = |y| row_by_hierarchy(rays, mesh, (y, columns.clone(), camera.width), n, (camera_rays, seen));
+    joined(rows.into_par_iter().map(row).collect())
+}
+
+/// As [`trace`], by the hierarchy whatever is seen.
+#[cfg(test)]
+pub(super) fn trace_by_hierarchy(rays: &RayMesh, mesh: &PosedMesh, camera: &Camera, n: u32) -> Hits {
+    let camera_rays = CameraRays::new(camera);
+    let seen: Vec<Seen> = mesh.triangles.iter().map(|&t| Seen::new(mesh, t, camera_rays.eye)).collect();
+    by_hierarchy(rays, mesh, camera, n, (&camera_rays, &seen))
+}
+
+/// The hits of a row of pixels by the hierarchy.
+fn row_by_hierarchy(
+    rays: &RayMesh,
+    mesh: &PosedMesh,
+    (y, columns, width): (u32, std::ops::Range<u32>, u32),
+    n: u32,
+    (camera_rays, seen): (&CameraRays, &[Seen]),
+) -> Hits {
+    let mut row = Hits::default();
+    let all = n * n;
+    for x in columns {
+        let (start, pixel) = (row.hits.len() as u32, y * width + x);
+        let turn = mix(pixel) % all;
+        for (i, d) in (0..).zip(camera_rays.of_pixel([x, y], n)) {
+            let cut = || (f64::from((i + turn) % all) + 0.5) / f64::from(all);
+            let hit = |triangle: u32, d| seen[triangle as usize].hit(d);
+            match shown(rays, mesh, (camera_rays.eye, d), cut, hit) {
+                Shown::Nothing => {}
+                Shown::Skin(hit) => row.hits.push(hit),
+                Shown::Plain(hit) => row.plain.push((pixel, hit)),
             }
-            part
-        })
-        .collect();
+        }
+        let end = row.hits.len() as u32;
+        if end > start {
+            row.pixels.push((pixel, start..end));
+        }
+    }
+    row
+}
+
+/// The hits of rows, one after the other.
+fn joined(rows: Vec<Hits>) -> Hits {
     let mut all = Hits::default();
-    for part in parts {
+    for row in rows {
         let base = all.hits.len() as u32;
         let shifted =
             |(pixel, hits): (u32, std::ops::Range<u32>)| (pixel, base + hits.start..base + hits.end);
-        all.pixels.extend(part.pixels.into_iter().map(shifted));
-        all.hits.extend(part.hits);
-        all.plain.extend(part.plain);
+        all.pixels.extend(row.pixels.into_iter().map(shifted));
+        all.hits.extend(row.hits);
+        all.plain.extend(row.plain);
     }
     all
 }

@@ -96,7 +96,7 @@ impl<R: Number> LevelMaker<R> {
             if wanted[at] {
                 drop(record);
                 let memory = before.take(at).or_else(|| self.memory(pass, atlas)).unwrap_or_default();
-                let mut fresh = Run::new(pass, (atlas, &made), params, cubes).record(memory);
+                let mut fresh = R::leave(&Run::new(pass, (atlas, &made), params, cubes), memory);
                 if self.program.dilated && self.flow.found[at] && !all {
                     fresh.fill(atlas.dilation());
                 }

@@ -1,8 +1,10 @@
 //! What levels are made of, and sixteen of it as the processor computes with them at once.
 
 use fearless_simd::prelude::*;
-use fearless_simd::{f32x16, i32x16};
+use fearless_simd::{Level as Instructions, f32x16, i32x16};
 
+use super::records::Record;
+use super::run::Run;
 use super::wide::{Four, Wide};
 use crate::engine::lanes::Lanes;
 use crate::model::batch::Batch;
@@ -16,6 +18,18 @@ pub trait Number: Real<Texel = Self, Wide = Self, Mask = bool> + From<f32> + Int
     type Sixteen<S: Simd>: Real<Texel = Self, Wide = Self::Sixteen<S>> + Wide<Self, S> + Send + Sync;
     /// Four of them.
     type Four<S: Simd>: Wide<Self, S>;
+
+    /// How many f32 a register holds at most of the instructions that passes over levels are compiled for.
+    const WIDEST: usize;
+
+    /// The best of these that the processor has.
+    fn instructions() -> Instructions {
+        let best = Instructions::new();
+        // A processor with AVX-512 has AVX2.
+        #[cfg(target_arch = "x86_64")]
+        let best = if Self::WIDEST < LANES { best.as_avx2().map_or(best, Simd::level) } else { best };
+        best
+    }
 
     /// These sixteen.
     fn load<S: Simd>(simd: S, numbers: &[Self; LANES]) -> Self::Sixteen<S>;
@@ -34,11 +48,16 @@ pub trait Number: Real<Texel = Self, Wide = Self, Mask = bool> + From<f32> + Int
 
     /// Sixteen times sixteen, rows and columns exchanged.
     fn transpose<S: Simd>(simd: S, rows: &mut [Self::Sixteen<S>; LANES]);
+
+    /// What a pass leaves, in memory that others have left. Of the kind alone: passes are compiled here, and not once more in
+    /// each crate that makes levels.
+    fn leave(pass: &Run<'_, Self>, memory: Vec<Self>) -> Record<Self>;
 }
 
 impl Number for f32 {
     type Sixteen<S: Simd> = Lanes<S>;
     type Four<S: Simd> = Four<S>;
+    const WIDEST: usize = LANES;
 
     #[inline(always)]
     fn load<S: Simd>(simd: S, numbers: &[Self; LANES]) -> Lanes<S> {
@@ -76,6 +95,10 @@ impl Number for f32 {
             turn(simd, &turned, rows);
         }
     }
+
+    fn leave(pass: &Run<'_, Self>, memory: Vec<Self>) -> Record<Self> {
+        pass.record(memory)
+    }
 }
 
 /// A turn of the bits by one.
@@ -90,6 +113,8 @@ fn turn<S: Simd>(simd: S, rows: &[Lanes<S>; LANES], turned: &mut [Lanes<S>; LANE
 impl Number for f64 {
     type Sixteen<S: Simd> = Batch<Self, LANES>;
     type Four<S: Simd> = Batch<Self, 4>;
+    /// What is exact and not fast is f64: AVX-512 is not compiled for it as well.
+    const WIDEST: usize = 8;
 
     #[inline(always)]
     fn load<S: Simd>(_: S, numbers: &[Self; LANES]) -> Batch<Self, LANES> {
@@ -122,6 +147,10 @@ impl Number for f64 {
         for (i, row) in rows.iter_mut().enumerate() {
             row.0 = std::array::from_fn(|k| before[k].0[i]);
         }
+    }
+
+    fn leave(pass: &Run<'_, Self>, memory: Vec<Self>) -> Record<Self> {
+        pass.record(memory)
     }
 }
 

@@ -14,7 +14,7 @@ const WIDE: usize = 4;
 /// Behind the last texel stand [`LANES`] numbers or more that mean nothing: sixteen are read at once from wherever a texel's
 /// begin.
 #[derive(Clone, Debug)]
-pub(super) struct Record<R> {
+pub struct Record<R> {
     /// Numbers a texel, [`WIDE`] at a time.
     pub(super) stride: usize,
     texels: usize,

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use fearless_simd::Level as Instructions;
+use fearless_simd::SimdBase;
 use rayon::prelude::*;
 
 use super::block::Block;
@@ -19,6 +19,7 @@ use crate::model::params::Params;
 use crate::program::graph::Input;
 use crate::program::levels::{APART_FIELD, BlurOf, GaussianOf, LevelPass, SurfaceOf, Then};
 use crate::program::shading::constant;
+use crate::program::steps::Setting;
 use crate::samples::{Atlas, LANES};
 use crate::simd::Simd;
 use crate::with_simd;
@@ -47,7 +48,7 @@ impl<R: Number, S: Simd> Yielded<'_, R, S> {
 }
 
 /// A pass over an atlas, after those before it.
-pub(super) struct Run<'a, R: Number> {
+pub struct Run<'a, R: Number> {
     pass: &'a LevelPass,
     atlas: &'a Atlas,
     made: &'a Made<R>,
@@ -125,7 +126,7 @@ impl<'a, R: Number> Run<'a, R> {
         Self { pass, atlas, made, params, cubes, loads, blocks, order, apart: apart.unwrap_or_default() }
     }
 
-    /// What the pass leaves, in memory that others have left.
+    /// As [`Number::leave`].
     pub(super) fn record(&self, memory: Vec<R>) -> Record<R> {
         match &self.pass.then {
             Then::Leave | Then::Neighbours(_) => self.left(memory),
@@ -182,7 +183,7 @@ impl<'a, R: Number> Run<'a, R> {
     fn gaussian(&self, of: &GaussianOf, memory: Vec<R>) -> Record<R> {
         let sources = Sources::new(of, &self.order, self.made, self.atlas);
         let gaussian = Gaussian::new(of, &self.order, self.atlas, &sources);
-        with_simd!(Instructions::new(), simd => {
+        with_simd!(R::instructions(), simd => {
             self.blocks(
                 simd,
                 memory,
@@ -204,7 +205,7 @@ impl<'a, R: Number> Run<'a, R> {
         // Of fewer than three components, 0 after.
         let counts = self.pass.leaves.iter().flat_map(|(_, count)| [0, 1, 2].map(|c| c < *count));
         let slots: Vec<Option<usize>> = counts.map(number).collect();
-        with_simd!(Instructions::new(), simd => {
+        with_simd!(R::instructions(), simd => {
             let nothing = R::splat(simd, R::from(0.0));
             self.blocks(
                 simd,
@@ -231,7 +232,7 @@ impl<'a, R: Number> Run<'a, R> {
 
     /// The pass' record: `then` makes a texel's numbers of its place and what the steps yield in a lane.
     fn each(&self, memory: Vec<R>, then: impl Fn(usize, &[[R; LANES]], usize, &mut [R]) + Sync) -> Record<R> {
-        with_simd!(Instructions::new(), simd => {
+        with_simd!(R::instructions(), simd => {
             self.blocks(simd, memory, #[inline(always)] |first, yielded, leaves, stride| {
                 let numbers: Vec<[R; LANES]> =
                     (0..yielded.numbers.len()).map(|at| R::array(yielded.number(at))).collect();
@@ -251,6 +252,9 @@ impl<'a, R: Number> Run<'a, R> {
         memory: Vec<R>,
         then: impl Fn(usize, Yielded<'_, R, S>, &mut [R], usize) + Sync,
     ) -> Record<R> {
+        if const { <S::f32s as SimdBase<S>>::LEN > R::WIDEST } {
+            unreachable!("instructions that nothing is compiled for")
+        }
         let like = Batch([R::splat(simd, R::from(0.0)); AT_ONCE]);
         let value = |input: &Input| constant(input, self.params).unwrap_or(0.0);
         let shared = self.pass.steps.setting(like, value, |name| self.cubes.named(name));
@@ -258,32 +262,52 @@ impl<'a, R: Number> Run<'a, R> {
         let stride = record.stride;
         let chunks = record.of_texels().par_chunks_mut(stride * CHUNK * LANES).enumerate();
         let memory = || Memory::<R, S> { read: vec![like; self.loads.len()], ..Memory::default() };
-        chunks.for_each_init(memory, |Memory { registers, numbers, read }, (chunk, texels)| {
+        chunks.for_each_init(memory, |memory, (chunk, texels)| {
             simd.vectorize(
                 #[inline(always)]
                 || {
                     for (group, texels) in texels.chunks_mut(stride * LANES * AT_ONCE).enumerate() {
                         let first = (chunk * CHUNK + group * AT_ONCE) * LANES;
-                        self.read(simd, first, read);
-                        self.pass.steps.run(
-                            &shared,
-                            like,
-                            registers,
-                            #[inline(always)]
-                            |at| match self.loads[at] {
-                                Load::Together => read[at],
-                                _ => self.field(simd, at, first),
-                            },
-                        );
-                        self.pass.steps.put(&shared, registers, numbers);
+                        self.yields(simd, first, &shared, memory);
                         for (record, texels) in texels.chunks_mut(stride * LANES).enumerate() {
-                            then(first + record * LANES, Yielded { numbers, record }, texels, stride);
+                            let yielded = Yielded { numbers: &memory.numbers, record };
+                            then(first + record * LANES, yielded, texels, stride);
                         }
                     }
                 },
             );
         });
         record
+    }
+
+    /// What the steps yield of the texels from `first` on, in the memory's numbers. Whatever is done with it calls this one
+    /// function: the steps for so many numbers at once are long.
+    #[inline(never)]
+    fn yields<S: Simd>(
+        &self,
+        simd: S,
+        first: usize,
+        shared: &Setting<'_, Numbers<R, S>>,
+        Memory { registers, numbers, read }: &mut Memory<R, S>,
+    ) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let like = Batch([R::splat(simd, R::from(0.0)); AT_ONCE]);
+                self.read(simd, first, read);
+                self.pass.steps.run(
+                    shared,
+                    like,
+                    registers,
+                    #[inline(always)]
+                    |at| match self.loads[at] {
+                        Load::Together => read[at],
+                        _ => self.field(simd, at, first),
+                    },
+                );
+                self.pass.steps.put(shared, registers, numbers);
+            },
+        );
     }
 
     /// Read together what stands side by side of sixteen texels: a row a texel, and then a row a number.
