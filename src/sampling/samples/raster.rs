@@ -5,6 +5,7 @@
 //! same is seen. Of triangles as far as each other to an f32 it is the first in the mesh.
 
 use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -14,11 +15,15 @@ use crate::bake::rays::RayMesh;
 use crate::scene::mesh::PosedMesh;
 use crate::scene::view::Camera;
 
-/// What lies nearer to the eye, as a share of the largest coordinate, is clipped: places in the image are exact to a ten
-/// millionth of their size there, far less than from a sample to the border of its stratum.
-const NEAR: f64 = 1e-9;
+/// What lies nearer to the eye, as a share of the largest coordinate, is clipped; with many samples a radian, more is: this
+/// for each. So edges that leave the image far away are exact to far less than from a sample to the border of its stratum.
+const NEAR: [f64; 2] = [1e-9, 1e-14];
 /// Tries for each sample of the image beyond which a hierarchy is taken: a ray finds its triangle there in as much time.
 const MOST_TRIES: u64 = 64;
+/// Spans for each sample beyond which it is, too, as they would take as much memory as what samples hold; and how many may be at
+/// least.
+const MOST_SPANS: u64 = 4;
+const SOME_SPANS: u64 = 1 << 22;
 
 /// A triangle, and the columns of samples that it can cover in a row of them.
 #[derive(Clone, Copy, Debug)]
@@ -63,38 +68,25 @@ impl Raster {
         seen: &[Seen],
     ) -> Option<Self> {
         let grid = Grid { n, columns: camera.width.checked_mul(n)?, rows: camera.height.checked_mul(n)? };
-        let clip = Clip::new(mesh, camera, camera_rays);
-        // All spans but their triangles, counted before there is room for them.
-        let of_triangle = |&index: &u32| {
-            let outline = clip.outline(mesh, index, &seen[index as usize]);
-            grid.rows_of(&outline).fold((0_u64, 0_u64), |(spans, tries), row| {
-                (spans + 1, tries + grid.columns_of(&outline, row).len() as u64)
-            })
-        };
-        let sum = |a: (u64, u64), b: (u64, u64)| (a.0 + b.0, a.1 + b.1);
-        let (spans, tries) = rays.triangles().par_iter().map(of_triangle).reduce(|| (0, 0), sum);
-        let samples = u64::from(grid.columns) * u64::from(grid.rows);
-        if spans.max(tries) > MOST_TRIES * samples {
-            return None;
-        }
+        let clip = Clip::new(mesh, camera, camera_rays, n);
         let outlines: Vec<(u32, Outline)> = rays
             .triangles()
             .par_iter()
             .map(|&index| (index, clip.outline(mesh, index, &seen[index as usize])))
             .filter(|(_, outline)| !grid.rows_of(outline).is_empty())
             .collect();
+        grid.affords(&outlines).then_some(())?;
         let mut starts = vec![0; grid.rows as usize + 1];
-        for row in outlines.iter().flat_map(|(_, outline)| grid.rows_of(outline)) {
+        for (row, _) in outlines.iter().flat_map(|(_, outline)| grid.spans_of(outline)) {
             starts[row as usize + 1] += 1;
         }
         for row in 0..grid.rows as usize {
             starts[row + 1] += starts[row];
         }
         let mut next = starts.clone();
-        let mut spans = vec![Span { triangle: 0, columns: [0; 2] }; spans as usize];
+        let mut spans = vec![Span { triangle: 0, columns: [0; 2] }; starts[grid.rows as usize]];
         for (triangle, outline) in outlines {
-            for row in grid.rows_of(&outline) {
-                let Range { start, end } = grid.columns_of(&outline, row);
+            for (row, Range { start, end }) in grid.spans_of(&outline) {
                 spans[next[row as usize]] = Span { triangle, columns: [start, end] };
                 next[row as usize] += 1;
             }
@@ -179,39 +171,42 @@ struct Clip<'a> {
     camera: &'a Camera,
     /// Where each vertex of the mesh stands in the image, and how deep.
     corners: Vec<(f64, f64, f64)>,
-    /// The least depth that is left.
+    /// The largest coordinate of the eye.
+    eye: f64,
+    /// The least depth that is left, as a share of the largest coordinate.
     near: f64,
-    /// A ray that meets something less deep than that meets it no further from the eye.
-    reach: f64,
+    /// The length of the longest direction, which goes one unit deep.
+    longest: f64,
 }
 
 impl<'a> Clip<'a> {
-    fn new(mesh: &PosedMesh, camera: &'a Camera, camera_rays: &CameraRays) -> Self {
+    fn new(mesh: &PosedMesh, camera: &'a Camera, camera_rays: &CameraRays, n: u32) -> Self {
         let corners = mesh.positions.par_iter().map(|position| camera.project(position.as_dvec3())).collect();
-        let largest = |place: DVec3| place.abs().max_element();
-        let far = mesh.positions.iter().map(|position| largest(position.as_dvec3()));
-        let near = NEAR * far.filter(|x| x.is_finite()).fold(largest(camera_rays.eye), f64::max);
         let [width, height] = [camera.width, camera.height].map(f64::from);
         let ends = [[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]];
-        // Directions go one unit deep; the longest are those of the image's corners.
         let longest = ends.iter().map(|[x, y]| camera_rays.direction(*x, *y).length()).fold(0.0, f64::max);
-        Self { camera, corners, near, reach: near * longest }
+        let focal = height / (2.0 * (0.5 * camera.fov_y).tan()) * camera.lens.ratio.max(1.0);
+        let near = NEAR[0].max(NEAR[1] * f64::from(n) * focal);
+        Self { camera, corners, eye: camera_rays.eye.abs().max_element(), near, longest }
     }
 
     /// What is left of a triangle.
     fn outline(&self, mesh: &PosedMesh, index: u32, seen: &Seen) -> Outline {
         let triangle = mesh.triangles[index as usize].map(|corner| corner as usize);
         let of = triangle.map(|corner| self.corners[corner]);
-        if of.iter().all(|corner| corner.2 >= self.near) {
+        let largest = |corner: usize| f64::from(mesh.positions[corner].abs().max_element());
+        let near = self.near * triangle.into_iter().map(largest).fold(self.eye, f64::max);
+        if of.iter().all(|corner| corner.2 >= near) {
             let [a, b, c] = of.map(|(x, y, _)| [x, y]);
             return finite([a, b, c, c], 3);
         }
-        // Seen from within its plane it covers nothing; from beside it, maybe all.
+        // From behind the eye, and from within its plane, it covers nothing.
         let plane = seen.plane();
-        if plane == 0.0 {
+        if of.iter().all(|corner| corner.2 < -near) || plane == 0.0 {
             return Outline::NOTHING;
         }
-        if plane <= self.reach {
+        // A ray that meets it less deep than `near` meets it no further from the eye than this, nor is its plane.
+        if plane <= near * self.longest {
             return Outline::Everything;
         }
         let places = triangle.map(|corner| mesh.positions[corner].as_dvec3());
@@ -222,7 +217,7 @@ impl<'a> Clip<'a> {
             count += 1;
         };
         for (i, j) in [(0, 1), (1, 2), (2, 0)] {
-            let (depth, other) = (of[i].2 - self.near, of[j].2 - self.near);
+            let (depth, other) = (of[i].2 - near, of[j].2 - near);
             if depth >= 0.0 {
                 keep(places[i]);
             }
@@ -249,15 +244,43 @@ impl Grid {
         clamp((n * low).floor())..clamp((n * high).floor() + 1.0)
     }
 
-    /// The rows of samples that an outline reaches.
+    /// The rows of samples that an outline reaches; none where it is beside the image.
     fn rows_of(self, outline: &Outline) -> Range<u32> {
-        match outline {
-            Outline::Corners(_, 0) => 0..0,
-            Outline::Corners(corners, count) => {
-                self.strata(bounds(corners[..*count].iter().map(|corner| corner[1])), self.rows)
-            }
-            Outline::Everything => 0..self.rows,
+        let Outline::Corners(corners, count) = outline else { return 0..self.rows };
+        let along = |axis: usize| bounds(corners[..*count].iter().map(|corner| corner[axis]));
+        if *count == 0 || self.strata(along(0), self.columns).is_empty() {
+            return 0..0;
         }
+        self.strata(along(1), self.rows)
+    }
+
+    /// Those rows of which it reaches samples, with their columns.
+    fn spans_of(self, outline: &Outline) -> impl Iterator<Item = (u32, Range<u32>)> {
+        let spans = self.rows_of(outline).map(move |row| (row, self.columns_of(outline, row)));
+        spans.filter(|(_, columns)| !columns.is_empty())
+    }
+
+    /// Whether a hierarchy would take longer than to try these, and they take little memory.
+    fn affords(self, outlines: &[(u32, Outline)]) -> bool {
+        let samples = u64::from(self.columns) * u64::from(self.rows);
+        let most = [MOST_TRIES * samples, SOME_SPANS.max(MOST_SPANS * samples)];
+        let [tries, spans] = [AtomicU64::new(0), AtomicU64::new(0)];
+        let beyond = || tries.load(Ordering::Relaxed) > most[0] || spans.load(Ordering::Relaxed) > most[1];
+        outlines.par_iter().for_each(|(_, outline)| {
+            // Sums only grow: whoever counts first, they are beyond in the end or not.
+            if beyond() {
+                return;
+            }
+            let (rows, strata) = match outline {
+                Outline::Everything => (u64::from(self.rows), samples),
+                Outline::Corners(..) => self
+                    .spans_of(outline)
+                    .fold((0, 0), |(rows, strata), (_, columns)| (rows + 1, strata + columns.len() as u64)),
+            };
+            spans.fetch_add(rows, Ordering::Relaxed);
+            tries.fetch_add(strata, Ordering::Relaxed);
+        });
+        !beyond()
     }
 
     /// The columns of samples that it reaches in one of these rows.
@@ -396,6 +419,38 @@ mod tests {
         assert!(by_triangles.hits == by_rays.hits && by_rays.hits.len() > 100, "{}", by_rays.hits.len());
     }
 
+    /// How many of a camera's rays hit a triangle of the mesh, each tried with all.
+    fn rays_that_hit(mesh: &PosedMesh, camera: &Camera, n: u32) -> usize {
+        let rays = CameraRays::new(camera);
+        let seen: Vec<Seen> = mesh.triangles.iter().map(|&t| Seen::new(mesh, t, rays.eye)).collect();
+        let pixels = (0..camera.height).flat_map(|y| (0..camera.width).map(move |x| [x, y]));
+        let directions = pixels.flat_map(|at| rays.of_pixel(at, n)).map(DVec3::normalize);
+        directions.filter(|d| seen.iter().any(|seen| seen.hit(*d).is_some())).count()
+    }
+
+    #[test]
+    fn what_goes_on_behind_the_eye_is_seen_through_the_longest_lens() {
+        let mut met = 0;
+        for k in 0..60 {
+            let (length, turn) = ([1.0, 30.0, 1000.0][k % 3], 0.1 * k as f32);
+            let beside = |turn: f32, z: f32| Vec3::new(1.7 * turn.cos(), 1.7 * turn.sin(), z);
+            // Two edges go from the middle of the image past the eye.
+            let mut mesh = PosedMesh::default();
+            mesh.positions.extend([
+                Vec3::new(0.0, 0.0, -length),
+                beside(turn, length),
+                beside(turn + 1.0, 0.5 * length),
+            ]);
+            mesh.triangles.push([0, 1, 2]);
+            let rays = RayMesh::new(&mesh.positions, &mesh.triangles);
+            let camera = Camera::pinhole(DMat4::IDENTITY, 1e-3_f64.to_radians(), [60, 80]);
+            let wanted = rays_that_hit(&mesh, &camera, 4);
+            assert_eq!(trace(&rays, &mesh, &camera, 4).hits.len(), wanted, "{k}");
+            met += wanted;
+        }
+        assert!(met > 10_000, "{met}");
+    }
+
     #[test]
     fn a_wall_that_the_eye_touches_is_seen_beside_it() {
         // It goes through the eye's plane, a millionth beside the eye, and on behind it.
@@ -410,11 +465,7 @@ mod tests {
         for side in [1e-6, -1e-3, 1e-3, 0.0] {
             let world_to_camera = DMat4::from_translation(DVec3::new(side, 0.0, 0.0));
             let camera = Camera::pinhole(world_to_camera, 1.2, [16, 12]);
-            let camera_rays = CameraRays::new(&camera);
-            let wall = Seen::new(&mesh, mesh.triangles[0], camera_rays.eye);
-            let pixels = (0..12).flat_map(|y| (0..16).map(move |x| [x, y]));
-            let rays_there = pixels.flat_map(|at| camera_rays.of_pixel(at, 2)).map(DVec3::normalize);
-            let met = rays_there.filter(|d| wall.hit(*d).is_some()).count();
+            let met = rays_that_hit(&mesh, &camera, 2);
             // Thinner than a hierarchy's boxes are exact, it is not looked for there.
             assert_eq!(trace(&rays, &mesh, &camera, 2).hits.len(), met, "{side}");
             assert!(met > 100, "{side}: {met}");

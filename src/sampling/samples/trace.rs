@@ -244,6 +244,7 @@ fn row_by_hierarchy(
 /// The hits of rows, one after the other.
 fn joined(rows: Vec<Hits>) -> Hits {
     let mut all = Hits::default();
+    all.hits.reserve(rows.iter().map(|row| row.hits.len()).sum());
     for row in rows {
         let base = all.hits.len() as u32;
         let shifted =
