@@ -76,20 +76,24 @@ impl Raster {
             .filter(|(_, outline)| !grid.rows_of(outline).is_empty())
             .collect();
         grid.affords(&outlines).then_some(())?;
+        // In the mesh's order, and then row by row.
+        let found: Vec<(u32, Span)> = outlines
+            .par_iter()
+            .flat_map_iter(|&(triangle, outline)| {
+                let span = move |(row, Range { start, end })| (row, Span { triangle, columns: [start, end] });
+                grid.spans_of(&outline).map(span).collect::<Vec<_>>()
+            })
+            .collect();
         let mut starts = vec![0; grid.rows as usize + 1];
-        for (row, _) in outlines.iter().flat_map(|(_, outline)| grid.spans_of(outline)) {
-            starts[row as usize + 1] += 1;
-        }
+        found.iter().for_each(|(row, _)| starts[*row as usize + 1] += 1);
         for row in 0..grid.rows as usize {
             starts[row + 1] += starts[row];
         }
         let mut next = starts.clone();
-        let mut spans = vec![Span { triangle: 0, columns: [0; 2] }; starts[grid.rows as usize]];
-        for (triangle, outline) in outlines {
-            for (row, Range { start, end }) in grid.spans_of(&outline) {
-                spans[next[row as usize]] = Span { triangle, columns: [start, end] };
-                next[row as usize] += 1;
-            }
+        let mut spans = vec![Span { triangle: 0, columns: [0; 2] }; found.len()];
+        for (row, span) in found {
+            spans[next[row as usize]] = span;
+            next[row as usize] += 1;
         }
         Some(Self { width: camera.width, n, spans, starts })
     }
@@ -110,7 +114,7 @@ impl Raster {
         let all = || rows.clone().flatten();
         let start = all().map(|span| span.columns[0] / n).min().unwrap_or(0);
         let end = all().map(|span| span.columns[1].div_ceil(n)).max().unwrap_or(0);
-        let wide = ((end - start.min(end)) * n) as usize;
+        let wide = ((end - start) * n) as usize;
         samples.clear();
         samples.resize(wide * n as usize, (DVec3::ZERO, f32::INFINITY, 0));
         let place = |x: u32, i: u32| (i / n) as usize * wide + ((x - start) * n + i % n) as usize;
