@@ -40,7 +40,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let constants = inputs.columns.clone().autodiff().require_grad();
     let albedo = inputs.albedo.clone().autodiff().require_grad();
     let tracked = Inputs { columns: constants.clone(), albedo: albedo.clone(), ..inputs.clone() };
-    let gradients = mean_square(shade.image(tracked)?).backward();
+    let gradients = mean_square(image(&shade, tracked)?).backward();
     let slopes = numbers(constants.grad(&gradients).ok_or("the loss does not depend on the constants")?)?;
     let of_albedo = albedo.grad(&gradients).ok_or("the loss does not depend on the albedo")?;
     println!(
@@ -53,7 +53,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let start = numbers(inputs.columns.clone())?;
     let loss = |at: Vec<f32>| -> Result<f32, Box<dyn Error>> {
         let columns = Tensor::<1>::from_data(TensorData::new(at, [FREE.len()]), shared.device());
-        let image = shade.image(Inputs { columns, ..inputs.clone() })?;
+        let image = image(&shade, Inputs { columns, ..inputs.clone() })?;
         Ok(mean_square(image).try_into_scalar::<f32>().map_err(|error| error.to_string())?)
     };
     let largest = slopes.iter().fold(0.0_f32, |most, slope| most.max(slope.abs()));
@@ -67,6 +67,14 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     Ok(())
+}
+
+/// The image, with light that stands in the UV atlas where a scene has such effects: it is made of the same constants.
+fn image(shade: &Shade, mut inputs: Inputs) -> Result<Tensor<2>, Box<dyn Error>> {
+    if let Some((levels, texels)) = shade.levels() {
+        inputs.levels = levels.make(Inputs { columns: inputs.columns.clone(), ..texels.clone() })?;
+    }
+    Ok(shade.image(inputs)?)
 }
 
 /// The sum over the count: burn's `mean` leaves out what is beyond some 262,000 numbers on adapters that allow 65,535

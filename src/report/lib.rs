@@ -45,6 +45,8 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use rayon::prelude::*;
+
 use crate::engine::joint::label;
 use crate::fit::outcome::Outcome;
 use crate::output::OutputError;
@@ -180,21 +182,19 @@ pub fn write_run(folder: &Path, run: &RunInfo, outcome: &Outcome) -> Result<Repo
     let (mut views, mut shown) = (Vec::new(), Vec::new());
     let options = ImageOptions { attributes: run.attributes(outcome), ..ImageOptions::default() };
     let bar = progress::bar("report", run.views.len() as u64);
-    for (view, stem) in run.views.iter().zip(file_stems(&run.views)) {
-        let comparison = Comparison::new(&view.target, &view.fit, &view.coverage);
-        let scores = comparison.scores();
-        warnings.extend(view.warnings(scores.is_some()));
-        let png = folder.join(format!("{stem}.png"));
-        let sheet = pictures::side_by_side(&view.title(), &view.target, &view.fit, &comparison, scores);
-        files::write_png_bytes(&png, sheet.width, sheet.height, &sheet.bytes)?;
-        let exr = folder.join(format!("{stem}_terms.exr"));
-        let haze = ("haze".to_owned(), view.haze.as_slice());
-        let planes = if view.haze.is_empty() { &[][..] } else { std::slice::from_ref(&haze) };
-        files::write_exr_layers(&exr, &view.fit, &view.terms, planes, &options)?;
-        written.extend([png, exr]);
-        views.push(ViewSummary::new(scores, comparison.pixels(), view.held_out));
-        shown.push(Picture::of_error(&comparison, view.fit.width));
+    let stems = file_stems(&run.views);
+    let told = run.views.par_iter().zip(&stems).map(|(view, stem)| {
+        let told = view.tell(folder, stem, &options);
         bar.inc(1);
+        told
+    });
+    // Of several files that cannot be written the first view's is told, on any number of threads.
+    for told in told.collect::<Vec<_>>() {
+        let Told { files, warnings: own, summary, error } = told?;
+        warnings.extend(own);
+        written.extend(files);
+        views.push(summary);
+        shown.push(error);
     }
     bar.finish_and_clear();
 
@@ -215,6 +215,14 @@ pub fn write_run(folder: &Path, run: &RunInfo, outcome: &Outcome) -> Result<Repo
     output::write(&path, page.as_bytes())?;
     written.push(path);
     Ok(Report { summary, json, files: written })
+}
+
+/// What [`write_run`] says of a view.
+struct Told {
+    files: [PathBuf; 2],
+    warnings: Vec<String>,
+    summary: ViewSummary,
+    error: Picture,
 }
 
 /// A run's name: its folder's.
@@ -324,6 +332,25 @@ fn software() -> String {
 }
 
 impl ViewEvidence {
+    /// Write its pictures into `folder`.
+    fn tell(&self, folder: &Path, stem: &str, options: &ImageOptions) -> Result<Told, ReportError> {
+        let comparison = Comparison::new(&self.target, &self.fit, &self.coverage);
+        let scores = comparison.scores();
+        let png = folder.join(format!("{stem}.png"));
+        let sheet = pictures::side_by_side(&self.title(), &self.target, &self.fit, &comparison, scores);
+        files::write_png_bytes(&png, sheet.width, sheet.height, &sheet.bytes)?;
+        let exr = folder.join(format!("{stem}_terms.exr"));
+        let haze = ("haze".to_owned(), self.haze.as_slice());
+        let planes = if self.haze.is_empty() { &[][..] } else { std::slice::from_ref(&haze) };
+        files::write_exr_layers(&exr, &self.fit, &self.terms, planes, options)?;
+        Ok(Told {
+            files: [png, exr],
+            warnings: self.warnings(scores.is_some()),
+            summary: ViewSummary::new(scores, comparison.pixels(), self.held_out),
+            error: Picture::of_error(&comparison, self.fit.width),
+        })
+    }
+
     /// Its name, and whether it was held out.
     fn title(&self) -> String {
         let name = &self.name;

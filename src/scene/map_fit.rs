@@ -55,15 +55,13 @@ impl MapKind {
 
 impl FitSettings {
     /// Hold what a fit of these maps leaves to the maps: a fitted environment has in its texels what turns and blurs it.
-    /// Beside any map the roughness is held, which the cubes of the specular lobe are baked for.
     ///
     /// To be done before bakes and samples are made, as what they hold depends on what is free. Returns what is not free any
     /// more, in the order of the columns.
     pub fn hold_beside(&mut self, kinds: &[MapKind]) -> Vec<Param> {
         let environment = kinds.contains(&MapKind::Environment);
         let of_light = |param| matches!(param, Param::SpecularLobe | Param::EnvironmentRotation);
-        let of_lobe = |param: Param| matches!(param.name(), "roughness" | "gloss");
-        let held = |param| (environment && of_light(param)) || (!kinds.is_empty() && of_lobe(param));
+        let held = |param| environment && of_light(param);
         let mut found: Vec<Param> =
             self.free.iter().map(|column| column.param).filter(|&p| held(p)).collect();
         found.dedup();

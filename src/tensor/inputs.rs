@@ -1,4 +1,4 @@
-//! What the shading operation takes: a tensor for each thing that may move.
+//! What operations take: a tensor for each thing that may move.
 
 use burn::backend::wgpu::{CubeBackend, CubeTensor};
 use burn::backend::{Autodiff, tensor::FloatTensor};
@@ -10,7 +10,8 @@ use super::buffer::{plain, tracked};
 pub use crate::adjoint::{INPUTS, Input};
 
 /// What the shading operation takes, on the shared device. What the enabled effects do not read is not looked at, and
-/// may have any shape.
+/// may have any shape. [`Levels`](crate::Levels) take the same of the texels of the UV atlas, in the place of N samples the T
+/// that the mesh covers.
 ///
 /// Samples stand in the order of the views' [`ViewSamples`](crate::samples::ViewSamples), one view after the other:
 /// `record * 16 + lane`. There are N of them, padding among them.
@@ -38,6 +39,10 @@ pub struct Inputs {
     pub reflected: Tensor<2>,
     /// E_r where it is white, likewise.
     pub glossy: Tensor<2>,
+    /// Of a scene whose light stands in its UV atlas, what samples look up there: \[T, W\], W numbers of each covered texel, as
+    /// [`Levels::make`](crate::Levels::make) makes them. They are those of the columns, maps and cubes that they were made
+    /// with.
+    pub levels: Tensor<2>,
 }
 
 /// A tensor of the tracked backend.
@@ -47,9 +52,9 @@ impl Inputs {
     /// Those that are tracked.
     pub(super) fn all_tracked(&self) -> Vec<Input> {
         let Self { columns, albedo, specular, attenuator, open, bump, .. } = self;
-        let Self { irradiance, lobe, hilite, reflected, glossy, .. } = self;
+        let Self { irradiance, lobe, hilite, reflected, glossy, levels, .. } = self;
         let of_samples = [albedo, specular, attenuator, open, bump];
-        let matrices = of_samples.into_iter().chain([irradiance, lobe, hilite, reflected, glossy]);
+        let matrices = of_samples.into_iter().chain([irradiance, lobe, hilite, reflected, glossy, levels]);
         let tracked = [columns.is_autodiff()].into_iter().chain(matrices.map(Tensor::is_autodiff));
         Input::ALL.into_iter().zip(tracked).filter(|(_, tracked)| *tracked).map(|(input, _)| input).collect()
     }
@@ -69,6 +74,7 @@ impl Inputs {
             plain(name(Input::Hilite), self.hilite)?,
             plain(name(Input::Reflected), self.reflected)?,
             plain(name(Input::Glossy), self.glossy)?,
+            plain(name(Input::Levels), self.levels)?,
         ])
     }
 
@@ -87,6 +93,7 @@ impl Inputs {
             tracked(name(Input::Hilite), self.hilite)?,
             tracked(name(Input::Reflected), self.reflected)?,
             tracked(name(Input::Glossy), self.glossy)?,
+            tracked(name(Input::Levels), self.levels)?,
         ])
     }
 }

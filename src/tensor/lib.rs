@@ -4,6 +4,7 @@
 //! - [`buffer`]: tensors as ranges of wgpu buffers, both ways without a copy
 //! - [`shade`]: the model as an operation, of what is [`Shaded`]; [`inputs`]: what it takes; `stage`: its passes;
 //!   `scatter`: what lookups of a cube gained, added to its texels
+//! - [`levels`]: what is computed in texels of the UV atlas, likewise; `operation`: what burn sees of both
 //! - `drawn`: samples that the adapter drew, as tensors
 //! - [`adjoint`]: the text of those passes: the image of stored samples, and its vector-Jacobian product
 //! - [`footprint`]: the linear maps of a scene: texels, vertices, cube borders
@@ -20,16 +21,20 @@ pub mod device;
 mod drawn;
 pub mod footprint;
 pub mod inputs;
+pub mod levels;
 pub mod maps;
+mod operation;
 mod pass;
 mod scatter;
 pub mod shade;
 mod shaded;
 pub mod sparse;
 mod stage;
+mod sum;
 
 pub use device::SharedDevice;
 pub use inputs::{Input, Inputs};
+pub use levels::Levels;
 pub use shade::Shade;
 pub use shaded::{Scatter, Shaded};
 pub use sparse::Sparse;
@@ -40,6 +45,8 @@ use burn::backend::{FloatDType, Shape};
 use burn_cubecl::CubeDevice;
 
 use crate::adjoint::AdjointError;
+use crate::model::effects::Effects;
+use crate::shader::PlanError;
 use gpu::{Gpu, GpuError};
 
 /// A tensor operation that cannot be done.
@@ -81,6 +88,21 @@ pub enum TensorError {
     /// No shader yields the image, or its derivatives.
     #[error(transparent)]
     Model(#[from] AdjointError),
+    /// What is computed in texels is not what tensors make.
+    #[error("tensors have no {what}. {remedy}, or leave tensors and maps out.")]
+    Levels {
+        /// What it is.
+        what: &'static str,
+        /// What to do.
+        remedy: &'static str,
+    },
+}
+
+impl TensorError {
+    /// That there are no texels for what `effects` compute in them.
+    fn no_atlas(effects: Effects) -> Self {
+        AdjointError::from(PlanError::no_atlas(effects)).into()
+    }
 }
 
 /// What a backward pass leaves when it cannot be done: zeros in the place of a gradient of that shape, and the

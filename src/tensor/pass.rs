@@ -1,9 +1,11 @@
 //! One compute pass of ours on the shared queue.
 
 use wgpu::{
-    BindGroupDescriptor, BindGroupEntry, BindingResource, CommandEncoder, ComputePassDescriptor,
-    ComputePipeline, ComputePipelineDescriptor, PipelineCompilationOptions, ShaderModule,
-    ShaderModuleDescriptor, ShaderSource,
+    BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor, BindGroupLayoutEntry,
+    BindingResource, BindingType, BufferBindingType, CommandEncoder, ComputePassDescriptor, ComputePipeline,
+    ComputePipelineDescriptor, PipelineCompilationOptions, PipelineLayout, PipelineLayoutDescriptor,
+    ShaderModule, ShaderModuleDescriptor, ShaderSource, ShaderStages, TextureSampleType,
+    TextureViewDimension,
 };
 
 use crate::gpu::{Gpu, GpuError, MOST_OF_A_DISPATCH};
@@ -21,9 +23,18 @@ pub(super) fn module(gpu: &Gpu, label: &str, wgsl: &str) -> Result<ShaderModule,
 
 /// An entry point of a module, its layout taken from the text.
 pub(super) fn pipeline(gpu: &Gpu, module: &ShaderModule, entry: &str) -> Result<ComputePipeline, GpuError> {
+    made(gpu, module, entry, None)
+}
+
+fn made(
+    gpu: &Gpu,
+    module: &ShaderModule,
+    entry: &str,
+    layout: Option<&PipelineLayout>,
+) -> Result<ComputePipeline, GpuError> {
     let pipeline = gpu.device.create_compute_pipeline(&ComputePipelineDescriptor {
         label: Some(entry),
-        layout: None,
+        layout,
         module,
         entry_point: Some(entry),
         compilation_options: PipelineCompilationOptions::default(),
@@ -31,6 +42,48 @@ pub(super) fn pipeline(gpu: &Gpu, module: &ShaderModule, entry: &str) -> Result<
     });
     gpu.check()?;
     Ok(pipeline)
+}
+
+const fn buffer_kind(ty: BufferBindingType) -> BindingType {
+    BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None }
+}
+
+pub(super) const UNIFORM: BindingType = buffer_kind(BufferBindingType::Uniform);
+pub(super) const READ: BindingType = buffer_kind(BufferBindingType::Storage { read_only: true });
+pub(super) const WRITE: BindingType = buffer_kind(BufferBindingType::Storage { read_only: false });
+/// A cube's faces.
+pub(super) const FACES: BindingType = BindingType::Texture {
+    sample_type: TextureSampleType::Float { filterable: false },
+    view_dimension: TextureViewDimension::D2Array,
+    multisampled: false,
+};
+
+/// An entry point of a module that may leave unread what its groups bind.
+pub(super) fn pipeline_of(
+    gpu: &Gpu,
+    module: &ShaderModule,
+    entry: &str,
+    groups: &[Vec<(u32, BindingType)>],
+) -> Result<ComputePipeline, GpuError> {
+    let layout = |kinds: &Vec<(u32, BindingType)>| {
+        let visibility = ShaderStages::COMPUTE;
+        let entry = |&(binding, ty): &(u32, BindingType)| BindGroupLayoutEntry {
+            binding,
+            visibility,
+            ty,
+            count: None,
+        };
+        let entries: Vec<BindGroupLayoutEntry> = kinds.iter().map(entry).collect();
+        gpu.device.create_bind_group_layout(&BindGroupLayoutDescriptor { label: None, entries: &entries })
+    };
+    let layouts: Vec<BindGroupLayout> = groups.iter().map(layout).collect();
+    let layouts: Vec<Option<&BindGroupLayout>> = layouts.iter().map(Some).collect();
+    let layout = gpu.device.create_pipeline_layout(&PipelineLayoutDescriptor {
+        label: Some(entry),
+        bind_group_layouts: &layouts,
+        immediate_size: 0,
+    });
+    made(gpu, module, entry, Some(&layout))
 }
 
 /// Encode a dispatch of at least `threads` threads. `groups` holds the bind groups' resources; the binding of each

@@ -18,7 +18,8 @@ pub(super) struct Scattering {
 
 impl Scattering {
     pub(super) fn new(gpu: &Gpu, way: Scatter) -> Result<Self, GpuError> {
-        let module = pass::module(gpu, "scatter", include_str!("scatter.wgsl"))?;
+        let text = concat!(include_str!("scatter.wgsl"), include_str!("sums.wgsl"));
+        let module = pass::module(gpu, "scatter", text)?;
         let pipeline = |entry| pass::pipeline(gpu, &module, entry);
         let (scatter, sums) = match way {
             Scatter::Exact => ("cs_exact", "cs_exact_sums"),

@@ -1,9 +1,5 @@
 // Adds what lookups of a cube have gained to the texels that they read: the transpose of `sample_faces`
 // (but that a place that is no number is clamped into the cube: here it says where to write).
-//
-// Exact sums are whole numbers of 64 bits, in two words: their additions commute, so that the result does not
-// depend on the order in which threads come. The unit is a power of two, chosen by the largest number that is to be
-// added. Fast sums are floats, exchanged when no other thread was quicker; their last bits vary.
 
 struct Size {
     // Texels along a face, without the border.
@@ -34,42 +30,6 @@ fn cs_largest(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups)
     }
     let g = abs(gained(s));
     atomicMax(&largest, bitcast<u32>(max(max(g.x, g.y), max(g.z, g.w))));
-}
-
-// The exponent of how many units make 1: so that no sum exceeds 62 bits.
-fn unit_exponent() -> i32 {
-    let exponent = i32(atomicLoad(&largest) >> 23u) - 127;
-    return clamp(61 - size.headroom - exponent, -126, 126);
-}
-
-fn power_of_two(exponent: i32) -> f32 {
-    return bitcast<f32>(u32(exponent + 127) << 23u);
-}
-
-fn add_exactly(at: u32, number: f32, units: f32) {
-    // Exact: a float has 24 bits, wherever they stand.
-    let magnitude = abs(number) * units;
-    let above = floor(magnitude * 0x1p-32);
-    var low = u32(magnitude - above * 0x1p32);
-    var high = u32(above);
-    if number < 0.0 {
-        low = ~low + 1u;
-        high = ~high + select(0u, 1u, low == 0u);
-    }
-    let before = atomicAdd(&sums[2u * at], low);
-    let carry = select(0u, 1u, before + low < before);
-    atomicAdd(&sums[2u * at + 1u], high + carry);
-}
-
-fn add_fast(at: u32, number: f32) {
-    var old = atomicLoad(&sums[at]);
-    loop {
-        let exchanged = atomicCompareExchangeWeak(&sums[at], old, bitcast<u32>(bitcast<f32>(old) + number));
-        if exchanged.exchanged {
-            break;
-        }
-        old = exchanged.old_value;
-    }
 }
 
 // The four texels around a place, the first's index and the place's share of the others.
@@ -106,7 +66,7 @@ fn cs_exact(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) g
         return;
     }
     let at = footprint(s);
-    let units = power_of_two(unit_exponent());
+    let units = power_of_two(unit_exponent(size.headroom));
     for (var corner = 0u; corner < 4u; corner++) {
         let texel = at.first + (corner & 1u) + (corner >> 1u) * at.side;
         let share = weight(at.f, corner);
@@ -142,15 +102,7 @@ fn cs_exact_sums(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
     if i >= 4u * size.texels {
         return;
     }
-    var low = atomicLoad(&sums[2u * i]);
-    var high = atomicLoad(&sums[2u * i + 1u]);
-    let negative = high >= 0x80000000u;
-    if negative {
-        low = ~low + 1u;
-        high = ~high + select(0u, 1u, low == 0u);
-    }
-    let magnitude = (f32(high) * 0x1p32 + f32(low)) * power_of_two(-unit_exponent());
-    texels[i] = select(magnitude, -magnitude, negative);
+    texels[i] = exact_sum(i, size.headroom);
 }
 
 @compute @workgroup_size(64)
@@ -159,5 +111,5 @@ fn cs_fast_sums(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroup
     if i >= 4u * size.texels {
         return;
     }
-    texels[i] = bitcast<f32>(atomicLoad(&sums[i]));
+    texels[i] = fast_sum(i);
 }

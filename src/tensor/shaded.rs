@@ -22,7 +22,8 @@ pub struct Shaded<'a> {
     pub setup: Setup,
     /// The values of the parameters that are not free, and where the free ones start.
     pub params: &'a Params,
-    /// The free columns; `specular_lobe` cannot be one, as it acts through its cube.
+    /// The free columns. Through cubes they do not act, which are inputs of their own: `specular_lobe` cannot be one, and
+    /// `roughness` and `gloss` move what is not looked up.
     pub columns: &'a [Column],
     /// The cubes to start from.
     pub illumination: &'a Illumination,

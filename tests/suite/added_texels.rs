@@ -460,6 +460,11 @@ mod over_stored_texels {
         let off = deviation(&cpu.normal_equations(&here), &want, &task.unknowns);
         assert!(off.size < 1e-4, "cpu: {}: {}", off.what, off.size);
         assert_fit(&cpu, &scene, "cpu");
+        #[cfg(feature = "burn")]
+        if let Some(shared) = crate::tensors::bench::shared() {
+            let columns: Vec<Column> = unknowns().iter().filter_map(Unknown::column).collect();
+            crate::tensors::lit::agree_at(shared, (task.clone(), &here), &columns, "added texels");
+        }
         let Some(gpu) = gpu() else { return };
         for part in [None, Some(1 << 17)] {
             let memory = Memory { part, resident: part };

@@ -15,7 +15,7 @@ use crate::sky::{brighter, effect, head_changed, on_cpu};
 use crate::slopes::{self, Nearness};
 
 /// The built-in head in scattered light: blurs some texels wide, half of the colour before them.
-fn head(more: &[Effect], change: impl FnOnce(&mut Scene)) -> Baked {
+pub(crate) fn head(more: &[Effect], change: impl FnOnce(&mut Scene)) -> Baked {
     let diffusion = ["directional_occlusion", "diffusion"].map(effect);
     let effects = [&[Effect::NormalMap, Effect::Lights][..], &diffusion, more].concat();
     head_changed(&effects, |scene| {
@@ -70,7 +70,7 @@ const RADII: [&str; 3] = ["diffusion_radius_1", "diffusion_radius_2", "diffusion
 const WEIGHTS: [&str; 3] = ["diffusion_weight_1", "diffusion_weight_2", "diffusion_weight_3"];
 
 /// All that moves the effect; a column that is tied moves all channels together, a weight has one each.
-fn columns() -> Vec<Column> {
+pub(crate) fn columns() -> Vec<Column> {
     let tied = ["colour_mix", "base_weight", "rim_weight", "occlusion", "normal_strength"];
     let light = ["environment_rotation", "light.side.color", "light.side.azimuth", "light.side.elevation"];
     let tied = RADII.into_iter().chain(tied).chain(light).map(|name| Column::tied(param(name)));

@@ -48,12 +48,12 @@ fn nothing_more(given_color: vec3f) -> vec3f {
 }
 ";
 
-fn given() -> &'static Term {
+pub(crate) fn given() -> &'static Term {
     static TERM: OnceLock<&'static Term> = OnceLock::new();
     TERM.get_or_init(|| register("given", GIVEN).unwrap_or_else(|error| panic!("{error}")))
 }
 
-fn setup(choices: DiffusionChoices) -> Setup {
+pub(crate) fn setup(choices: DiffusionChoices) -> Setup {
     library::register_all();
     let diffusion = Effect::from_name("diffusion").unwrap();
     let mut setup =
@@ -80,15 +80,15 @@ fn param(name: &str) -> Param {
 }
 
 /// Rows of texels, one after another.
-struct Texels {
-    size: usize,
-    charts: Vec<u32>,
+pub(crate) struct Texels {
+    pub(crate) size: usize,
+    pub(crate) charts: Vec<u32>,
     /// Of each texel of the square: by the field's name.
-    fields: Vec<(&'static str, Vec<[f64; 3]>)>,
+    pub(crate) fields: Vec<(&'static str, Vec<[f64; 3]>)>,
 }
 
 impl Texels {
-    fn atlas(&self, setup: &Setup) -> Arc<Atlas> {
+    pub(crate) fn atlas(&self, setup: &Setup) -> Arc<Atlas> {
         let inputs = texel_inputs(&facts(*setup)).unwrap();
         let value = |input: &Input, texel: usize| {
             let of = |name: &str| {
@@ -118,13 +118,20 @@ fn rows(node: &Node<'_>) -> Vec<Vec<[f64; 3]>> {
 }
 
 /// The atlas of the vectors, in a square, its light scaled as `diffusion2_atlas` says.
-struct Case<'v> {
+pub(crate) struct GivenLight<'v> {
     file: Node<'v>,
-    texels: Texels,
-    params: Params,
+    pub(crate) texels: Texels,
+    pub(crate) params: Params,
 }
 
-impl<'v> Case<'v> {
+/// Where a sample looks it up.
+pub(crate) struct Looking {
+    pub(crate) uv: [f64; 2],
+    pub(crate) chart: u32,
+    pub(crate) albedo: [f64; 3],
+}
+
+impl<'v> GivenLight<'v> {
     fn new(vectors: &'v Vectors) -> Self {
         let file = vectors.files["diffusion2_atlas.json"].root();
         let inputs = file.at("inputs");
@@ -162,26 +169,46 @@ impl<'v> Case<'v> {
         Self { file, texels, params }
     }
 
-    /// Samples at the file's lookups.
-    fn samples(&self, atlas: &Arc<Atlas>) -> ViewSamples {
+    /// As one of the files has it that mix colours before and after.
+    pub(crate) fn mixed(vectors: &'v Vectors, file: &Node<'_>) -> Self {
+        let mut light = Self::new(vectors);
+        let constants = file.at("constants");
+        file.at("atlas_file").assert_text("diffusion2_atlas.json");
+        light.params.set(param("colour_mix"), constants.at("colour_mix").number());
+        let radii = constants.at("radii").numbers();
+        (1..).zip(&radii).for_each(|(k, &radius)| {
+            assert_eq!(light.params.scalar(param(&format!("diffusion_radius_{k}"))), radius);
+        });
+        light
+    }
+
+    /// The file's lookups.
+    pub(crate) fn lookups(&self) -> Vec<Looking> {
         let inputs = self.file.at("inputs");
         let squeeze = inputs.at("height").number() / self.texels.size as f64;
-        let lookups = inputs.at("lookups").items();
+        let looking = |lookup: Node<'_>| {
+            lookup.at("case").text();
+            let [u, v] = [0, 1].map(|c| lookup.at("uv").item(c).number());
+            let chart = lookup.at("chart").number() as u32;
+            Looking { uv: [u, v * squeeze], chart, albedo: lookup.at("albedo").three() }
+        };
+        inputs.at("lookups").items().into_iter().map(looking).collect()
+    }
+
+    /// Samples there.
+    pub(crate) fn samples(&self, atlas: &Arc<Atlas>) -> ViewSamples {
+        let lookups = self.lookups();
         let asked = Asked { uv: true, albedo: true, ..Asked::default() };
         let mut surface = SurfaceRecords::new(asked, 1);
         for slot in 0..LANES {
-            let lookup = &lookups[slot.min(lookups.len() - 1)];
-            lookup.at("case").text();
-            let [u, v] = [0, 1].map(|c| lookup.at("uv").item(c).number());
-            let albedo = lookup.at("albedo").three().map(|x| x as f32);
+            let Looking { uv, chart, albedo } = &lookups[slot.min(lookups.len() - 1)];
             let fragment = skinfit::model::fragment::Fragment {
                 base: [0.0, 0.0, 1.0],
                 view: [0.0, 0.0, -1.0],
-                albedo,
+                albedo: albedo.map(|x| x as f32),
                 ..NEUTRAL
             };
-            let uv = [u as f32, (v * squeeze) as f32];
-            let chart = lookup.at("chart").number() as f32;
+            let (uv, chart) = (uv.map(|x| x as f32), *chart as f32);
             surface.set_all(slot, &(fragment, Unmade { uv, chart, ..Unmade::default() }), 1.0);
         }
         ViewSamples {
@@ -193,9 +220,16 @@ impl<'v> Case<'v> {
             ..ViewSamples::default()
         }
     }
+}
 
-    fn lookups(&self) -> usize {
-        self.file.at("inputs").at("lookups").items().len()
+/// The taps of a file's blurs.
+pub(crate) fn taps_of(file: &Node<'_>) -> Taps {
+    match file.at("constants").at("taps") {
+        name if name.is_text() => {
+            name.assert_text(Taps::Full.name());
+            Taps::Full
+        }
+        count => *Taps::ALL.iter().find(|taps| taps.count() == Some(count.number() as u32)).unwrap(),
     }
 }
 
@@ -242,7 +276,7 @@ struct Shown {
 }
 
 fn shown<R: Number>(
-    case: &Case<'_>,
+    case: &GivenLight<'_>,
     setup: &Setup,
     params: &Params,
     seeds: &[Param],
@@ -261,7 +295,7 @@ fn shown<R: Number>(
         quantities: names.iter().map(|&name| (name, Vec::new())).collect(),
         slopes: seeds.iter().map(|_| Vec::new()).collect(),
     };
-    let fragments = (0..case.lookups()).map(|slot| samples.surface.fragment(slot));
+    let fragments = (0..case.lookups().len()).map(|slot| samples.surface.fragment(slot));
     for (slot, fragment) in fragments.enumerate() {
         let setting =
             steps.setting(0.0_f64, |input| constant(input, params).unwrap(), |name| panic!("no cube {name}"));
@@ -300,22 +334,9 @@ const LEVELS: [&str; 4] =
 
 /// Light map, levels, what fragments show of them and how it moves.
 fn mixed<R: Number>(vectors: &Vectors, file: &Node<'_>) {
-    let mut case = Case::new(vectors);
-    let (constants, expected) = (file.at("constants"), file.at("expected"));
-    file.at("atlas_file").assert_text("diffusion2_atlas.json");
-    let taps = match constants.at("taps") {
-        name if name.is_text() => {
-            name.assert_text(Taps::Full.name());
-            Taps::Full
-        }
-        count => *Taps::ALL.iter().find(|taps| taps.count() == Some(count.number() as u32)).unwrap(),
-    };
-    let setup = setup(DiffusionChoices { taps, ..DiffusionChoices::DEFAULT });
-    case.params.set(param("colour_mix"), constants.at("colour_mix").number());
-    let radii = constants.at("radii").numbers();
-    (1..).zip(&radii).for_each(|(k, &radius)| {
-        assert_eq!(case.params.scalar(param(&format!("diffusion_radius_{k}"))), radius);
-    });
+    let case = GivenLight::mixed(vectors, file);
+    let expected = file.at("expected");
+    let setup = setup(DiffusionChoices { taps: taps_of(file), ..DiffusionChoices::DEFAULT });
     let near = near::<R>(file);
     let made = levels::<R>(&setup, &case.texels.atlas(&setup), &case.params);
     if let Some(want) = expected.get("light_map") {
@@ -351,7 +372,7 @@ fn mixed<R: Number>(vectors: &Vectors, file: &Node<'_>) {
     let names = [&LEVELS[..], &["scattered_light", "diffuse_part"]].concat();
     let shown = shown::<R>(&case, &setup, &case.params, &columns, &names);
     let looked_up: Vec<Vec<f64>> = LEVELS.iter().map(|name| shown.of(name)).collect();
-    let order = (0..case.lookups())
+    let order = (0..case.lookups().len())
         .flat_map(|i| looked_up.iter().flat_map(move |level| level[3 * i..3 * i + 3].to_vec()));
     near.check("levels looked up", &order.collect::<Vec<f64>>(), &expected.at("levels_at_lookups"));
     near.check("scattered, looked up", &shown.of("scattered_light"), &expected.at("scattered_at_lookups"));
@@ -363,14 +384,14 @@ fn mixed<R: Number>(vectors: &Vectors, file: &Node<'_>) {
     let want = expected.at("dilated").at("scattered_at_lookups");
     near.check("scattered, looked up by one fetch", &found.of("scattered_light"), &want);
     // Where a deviation is many texels, taps move by as many for a millimetre: what rounds counts tenfold.
-    let slopes = (0..case.lookups()).flat_map(|i| (0..3).map(move |c| (i, c)));
+    let slopes = (0..case.lookups().len()).flat_map(|i| (0..3).map(move |c| (i, c)));
     let slopes = slopes.flat_map(|(i, c)| shown.slopes.iter().map(move |slope| slope[i][c]));
     near.times(10.0).check("Jacobian", &slopes.collect::<Vec<f64>>(), &jacobian.at("J"));
 }
 
 /// The adjoint of the blurs, made of their forward passes: what the scattered light weighed by the cotangent is of a light map
 /// of one texel alone is the gradient by that texel.
-fn adjoint(case: &Case<'_>, setup: &Setup, file: &Node<'_>) {
+fn adjoint(case: &GivenLight<'_>, setup: &Setup, file: &Node<'_>) {
     let expected = file.at("expected").at("adjoint");
     let cotangent = expected.at("cotangent").wanted();
     let shading = Shading::new(&facts(*setup), &[], |_| None, Natives::Written).unwrap();
@@ -416,12 +437,12 @@ fn light_maps_levels_and_lookups_are_those_of_the_vectors_and_move_as_they_do() 
 
 /// What each lookup weighs of the light map, texel by texel.
 fn lookup_weights(vectors: &Vectors, lookup: Lookup, want: &Node<'_>) {
-    let case = Case::new(vectors);
+    let case = GivenLight::new(vectors);
     let setup = setup(DiffusionChoices { lookup, ..DiffusionChoices::DEFAULT });
     let size = case.texels.size;
     let covered: Vec<usize> = (0..size * size).filter(|&i| case.texels.charts[i] > 0).collect();
-    let mut weights = vec![Vec::new(); case.lookups()];
-    let mut one = Case::new(vectors);
+    let mut weights = vec![Vec::new(); case.lookups().len()];
+    let mut one = GivenLight::new(vectors);
     // A texel a channel is lit at a time: what a lookup finds is what it weighs.
     for three in covered.chunks(3) {
         let mut lit = vec![[0.0; 3]; size * size];
@@ -461,7 +482,7 @@ fn lookups_weigh_the_texels_of_their_own_chart_or_those_that_one_fetch_finds() {
 
 /// A light map of one constant has levels of that constant, to the bit.
 fn constant_levels(vectors: &Vectors) {
-    let mut case = Case::new(vectors);
+    let mut case = GivenLight::new(vectors);
     let constant = case.file.at("expected").at("constant");
     let light = constant.at("light").wanted()[0];
     let every = constant.at("every_level").wanted()[0];
@@ -488,12 +509,12 @@ fn stretch_from_neighbour_to_neighbour_is_that_of_the_vectors() {
     let vectors = read();
     let file = vectors.files["diffusion2_stretch.json"].root();
     file.at("atlas_file").assert_text("diffusion2_atlas.json");
-    let mut case = Case::new(&vectors);
+    let mut case = GivenLight::new(&vectors);
     let position = case.texels.list(&rows(&file.at("inputs").at("position_mm")));
     case.texels.fields.push(("vertex_position", position));
     let setup = setup(DiffusionChoices { stretch: Stretch::Derivative, ..DiffusionChoices::DEFAULT });
     let atlas = case.texels.atlas(&setup);
-    fn check<R: Number>(case: &Case<'_>, setup: &Setup, atlas: &Atlas, want: &Node<'_>) {
+    fn check<R: Number>(case: &GivenLight<'_>, setup: &Setup, atlas: &Atlas, want: &Node<'_>) {
         let made = levels::<R>(setup, atlas, &case.params);
         let stretch = &made["diffusion_stretch"];
         let size = case.texels.size;

@@ -1,6 +1,6 @@
 //! A scene with all that is baked of it.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use web_time::Instant;
 
@@ -35,6 +35,8 @@ pub struct Baked {
     pub sky: Option<Arc<SkyBake>>,
     /// How thick the mesh is below each vertex, when asked for.
     pub thickness: Option<Arc<VertexThickness>>,
+    /// The folder of the bakes that are kept.
+    pub cache: Option<PathBuf>,
     /// The cameras that were moved to where the targets show the mesh, if the fit is to.
     pub cameras: Vec<MovedCamera>,
     /// What was baked, and what came from the cache.
@@ -80,6 +82,7 @@ impl Baked {
             occlusion,
             sky,
             thickness,
+            cache: asked.cache.clone(),
             cameras,
             stats,
             seconds,
@@ -107,8 +110,8 @@ impl Baked {
     #[must_use]
     pub fn surface_bakes(&self) -> SurfaceBakes<'_> {
         let (occlusion, sky) = (self.occlusion.as_deref(), self.sky.as_deref());
-        let thickness = self.thickness.as_deref();
-        SurfaceBakes { occlusion, sky, thickness, ..SurfaceBakes::default() }
+        let (thickness, cache) = (self.thickness.as_deref(), self.cache.as_deref());
+        SurfaceBakes { occlusion, sky, thickness, cache, ..SurfaceBakes::default() }
     }
 
     /// Trace the visible surface of each view.

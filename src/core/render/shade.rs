@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::image::Image;
 use crate::bake::Illumination;
-use crate::engine::cubes_at::CubesAt;
+use crate::engine::cubes_at::{CubesAt, Sixteen};
 use crate::engine::rules::{Loads, Registers, SampleSteps, Setting, sample_facts};
 use crate::model::effects::{Effect, Effects};
 use crate::model::evaluate::Setup;
@@ -50,15 +50,6 @@ pub struct Shader {
     level: Level,
 }
 
-/// A pixel's sums.
-struct Pixel {
-    index: usize,
-    coverage: f32,
-    terms: Vec<[f64; 3]>,
-    haze: f64,
-    glow: [f64; 3],
-}
-
 impl Shader {
     /// Of a scene's cubes, at `params`.
     ///
@@ -95,26 +86,27 @@ impl Shader {
         };
         let setting = self.steps.setting(&self.params, &self.cubes, 0.0);
         let loads = self.steps.loads(samples, &self.params, &self.cubes);
-        let groups: Vec<Vec<Pixel>> = (0..samples.groups())
-            .into_par_iter()
-            .map_init(Registers::default, |registers, group| {
-                self.group(samples, group, gain, (&setting, &loads), registers)
-            })
-            .collect();
-        for pixel in groups.into_iter().flatten() {
-            let at = pixel.index;
-            for (term, (_, image)) in pixel.terms.iter().zip(&mut shaded.terms) {
-                image.rgb[at] = term.map(|x| x as f32);
-                image.alpha[at] = pixel.coverage;
+        let numbers = self.numbers(samples, gain, (&setting, &loads));
+        let stride = self.stride();
+        let slots = || (0..samples.groups() * LANES).filter(|&slot| samples.pixel[slot] != u32::MAX);
+        let fill = |image: &mut Image, first: usize| {
+            for slot in slots() {
+                let at = samples.pixel[slot] as usize;
+                image.rgb[at] = [0, 1, 2].map(|c| numbers[slot * stride + first + c]);
+                image.alpha[at] = samples.coverage[slot];
             }
-            shaded.image.rgb[at] =
-                [0, 1, 2].map(|c| pixel.terms.iter().map(|term| term[c]).sum::<f64>() as f32);
-            shaded.image.alpha[at] = pixel.coverage;
-            if let Some(haze) = shaded.haze.get_mut(at) {
-                *haze = pixel.haze as f32;
+        };
+        let whole = 3 * self.names.len();
+        let Shaded { image, terms, haze, glow, .. } = &mut shaded;
+        let images = terms.iter_mut().map(|(_, image)| image).chain([image]).enumerate();
+        images.collect::<Vec<_>>().into_par_iter().for_each(|(k, image)| fill(image, 3 * k));
+        for slot in slots() {
+            let (at, own) = (samples.pixel[slot] as usize, &numbers[slot * stride + whole + 3..]);
+            if let Some(haze) = haze.get_mut(at) {
+                *haze = own[0];
             }
-            if let Some(glow) = shaded.glow.get_mut(at) {
-                *glow = pixel.glow.map(|x| x as f32);
+            if let Some(glow) = glow.get_mut(at) {
+                *glow = [own[1], own[2], own[3]];
             }
         }
         if !samples.plain.is_empty() {
@@ -131,54 +123,75 @@ impl Shader {
         shaded
     }
 
-    /// The pixels of a group: means over their samples, premultiplied by their coverage.
+    /// How many numbers a pixel has: of each term, of the whole, the haze and the glow.
+    const fn stride(&self) -> usize {
+        3 * self.names.len() + 7
+    }
+
+    /// What each pixel slot shows, [`Self::stride`] numbers a slot. All cores.
+    fn numbers(
+        &self,
+        samples: &ViewSamples,
+        gain: Gain,
+        (setting, loads): (&Setting<'_, f64>, &Loads),
+    ) -> Vec<f32> {
+        let stride = LANES * self.stride();
+        let mut numbers = vec![0.0; samples.groups() * stride];
+        numbers.par_chunks_mut(stride).enumerate().for_each_init(
+            || (Registers::default(), vec![0.0; stride], Vec::new()),
+            |(registers, sums, shown), (group, numbers)| {
+                sums.fill(0.0);
+                self.group(samples, group, gain, (setting, loads), (registers, sums, shown));
+                numbers.iter_mut().zip(sums).for_each(|(number, sum)| *number = *sum as f32);
+            },
+        );
+        numbers
+    }
+
+    /// The pixels of a group: means over their samples, premultiplied by their coverage, added to `sums`.
     fn group(
         &self,
         samples: &ViewSamples,
         group: usize,
         gain: Gain,
         (setting, loads): (&Setting<'_, f64>, &Loads),
-        registers: &mut Registers<f64>,
-    ) -> Vec<Pixel> {
-        let count = self.names.len();
-        let mut pixels: Vec<Pixel> = (group * LANES..(group + 1) * LANES)
-            .map(|slot| Pixel {
-                index: samples.pixel[slot] as usize,
-                coverage: samples.coverage[slot],
-                terms: vec![[0.0; 3]; count],
-                haze: 0.0,
-                glow: [0.0; 3],
-            })
-            .collect();
-        let mut numbers = Vec::with_capacity(3 * count + 1);
+        (registers, sums, shown): (&mut Registers<f64>, &mut [f64], &mut Vec<Sixteen<f64>>),
+    ) {
+        let whole = 3 * self.names.len();
         for record in samples.group_start[group] as usize..samples.group_start[group + 1] as usize {
-            numbers.clear();
+            shown.clear();
             // The same numbers with any instructions: nothing is fused, and lanes do not meet.
             with_simd!(self.level, simd => {
                 let _ = simd;
-                numbers.extend(self.steps.record(setting, loads, &samples.surface, record, registers));
+                shown.extend(self.steps.record(setting, loads, &samples.surface, record, registers));
             });
-            for (lane, pixel) in pixels.iter_mut().enumerate() {
+            for (lane, own) in sums.chunks_mut(self.stride()).enumerate() {
                 let weight = f64::from(samples.surface.weight(record * LANES + lane));
-                let share = weight * f64::from(pixel.coverage);
+                let share = weight * f64::from(samples.coverage[group * LANES + lane]);
                 // Padding holds no numbers that could be relied on.
                 if share == 0.0 {
                     continue;
                 }
-                let haze = share * numbers[3 * count].0[lane];
+                let haze = share * shown[whole].0[lane];
                 let shares = gain.0.map(|gain| share * gain);
-                for (term, value) in pixel.terms.iter_mut().zip(numbers.chunks(3)) {
+                for (term, value) in own.chunks_mut(3).zip(shown.chunks_exact(3)) {
                     for c in 0..3 {
-                        let value = value[c].0[lane];
-                        term[c] += shares[c] * value;
-                        pixel.glow[c] += gain.0[c] * haze * value;
+                        term[c] += shares[c] * value[c].0[lane];
                     }
                 }
-                pixel.haze += gain.channel(3) * haze;
+                for value in shown.chunks_exact(3) {
+                    for c in 0..3 {
+                        own[whole + 4 + c] += gain.0[c] * haze * value[c].0[lane];
+                    }
+                }
+                own[whole + 3] += gain.channel(3) * haze;
             }
         }
-        pixels.retain(|pixel| pixel.index != u32::MAX as usize);
-        pixels
+        for own in sums.chunks_mut(self.stride()) {
+            for c in 0..3 {
+                own[whole + c] = own[c..whole].iter().step_by(3).sum();
+            }
+        }
     }
 }
 

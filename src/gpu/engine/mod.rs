@@ -7,7 +7,7 @@
 //!   memory allowed is uploaded anew in each pass. `cuts`: where views are cut; `dispatch`: how a part is dispatched
 //! - [`DeviceSamples`]: samples that the adapter makes itself, by the production renderer's geometry pass
 //! - `terms`: samples replaced by their terms, where no free parameter needs a lookup
-//! - `levels`: levels of the UV atlas, and what samples look up of them
+//! - `levels`: levels of the UV atlas, and what samples look up of them ([`StoredAtlas`]: what they are made of)
 //! - `lights`: the cubes and the uniform block, as shaders are given them
 //! - `program`: the shaders of a wish, and one run of them
 //! - `images`: the forward pass: images, and how long they take
@@ -36,6 +36,7 @@ use self::equations::PassSums;
 use self::fused::{Fitted, Fused, Layout, Looked};
 use self::images::Images;
 use self::levels::DeviceLevels;
+pub use self::levels::StoredAtlas;
 use self::lights::DeviceLights;
 use self::parts::{Parts, ViewFormat};
 use self::program::Program;

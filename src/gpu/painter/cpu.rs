@@ -75,6 +75,8 @@ impl CpuPainter {
             sky: own.sky.as_ref().or(self.baked.sky.as_deref()),
             thickness: own.thickness.as_ref().or(self.baked.thickness.as_deref()),
             gather: gather.as_ref(),
+            // A turn's frames would fill the folder with poses of their own.
+            cache: None,
             lobe_sky: self.lobe_sky.as_ref(),
             mip_maps: self.mip_maps.as_ref(),
         };

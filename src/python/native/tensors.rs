@@ -207,9 +207,10 @@ fn refused(error: &MapError, scene: &Path) -> Refused {
     };
     let words = format!("{}: {}.", scene.display(), words.trim_end_matches('.'));
     match error {
-        MapError::Tensor(TensorError::Model(_))
+        MapError::Tensor(TensorError::Model(_) | TensorError::Levels { .. })
         | MapError::Shading(_)
         | MapError::Beside { .. }
+        | MapError::InTexels { .. }
         | MapError::Filtered { .. }
         | MapError::LaidOut { .. }
         | MapError::Unread { .. }

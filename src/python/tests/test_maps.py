@@ -182,7 +182,7 @@ def test_a_light_that_is_too_dark_is_brightened(little_file: Path, cache: Path) 
 @pytest.mark.usefixtures("unwarned")
 def test_what_cannot_be_is_refused(little_file: Path, cache: Path) -> None:
     scene = skinfit.load_file(little_file, cache=cache)
-    with pytest.raises(skinfit.ParamError, match="specular_lobe cannot be fitted beside maps"):
+    with pytest.raises(skinfit.ParamError, match="specular_lobe cannot be fitted beside the environment"):
         scene.map_objective("environment")
     with pytest.raises(skinfit.ArrayError, match="Did you mean `color`"):
         scene.map_objective("colour")

@@ -40,7 +40,7 @@ pub enum PlanError {
     },
     /// Quantities of an atlas where there is none.
     #[error(
-        "the effect {effect} is computed in texels of the UV atlas, which maps' fits, tensors, samples made on an adapter and meshes without texture coordinates do not have. Leave the effect out there, or have the CPU make the samples."
+        "the effect {effect} is computed in texels of the UV atlas, which samples made on an adapter and meshes without texture coordinates do not have. Leave the effect out there, or have the CPU make the samples."
     )]
     NoAtlas {
         /// The effect.

@@ -125,7 +125,11 @@ impl Baker<'_> {
 
 /// A key with the mesh at rest and with each of `morphs` targets at weight 1, and how many vertices it has; and with what
 /// its rays are drawn by.
-fn posed_key(mut key: Key, pose: &(dyn Fn(&[f32]) -> PosedMesh + Sync), morphs: usize) -> (Key, usize) {
+pub(super) fn posed_key(
+    mut key: Key,
+    pose: &(dyn Fn(&[f32]) -> PosedMesh + Sync),
+    morphs: usize,
+) -> (Key, usize) {
     let mut vertices = 0;
     for target in 0..=morphs {
         let weights: Vec<f32> = (1..=morphs).map(|i| f32::from(u8::from(i == target))).collect();

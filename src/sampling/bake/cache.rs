@@ -10,12 +10,13 @@ use std::sync::LazyLock;
 use crate::{files, output};
 
 /// All that makes bakes of their inputs: another text may make others, so that old files are left alone.
-const SOURCES: [&str; 32] = [
+const SOURCES: [&str; 33] = [
     include_str!("baker.rs"),
     include_str!("between.rs"),
     include_str!("cache.rs"),
     include_str!("coefficients.rs"),
     include_str!("cutouts.rs"),
+    include_str!("gather_cache.rs"),
     include_str!("harmonics.rs"),
     include_str!("interreflection.rs"),
     include_str!("lobe_kernel.rs"),
@@ -104,8 +105,8 @@ fn path(folder: &Path, kind: &str, key: &Key) -> PathBuf {
     folder.join(format!("{kind}-{}.bake", &key.hash().to_hex()[..32]))
 }
 
-/// Read the bake of `key`, which must hold `count` numbers.
-pub(super) fn read(folder: &Path, kind: &str, key: &Key, count: usize) -> Found {
+/// Read the bake of `key`, which must hold `count` numbers, where that is known.
+pub(super) fn read(folder: &Path, kind: &str, key: &Key, count: impl Into<Option<usize>>) -> Found {
     let path = path(folder, kind, key);
     let bytes = match files::read(&path) {
         Ok(bytes) => bytes,
@@ -115,7 +116,7 @@ pub(super) fn read(folder: &Path, kind: &str, key: &Key, count: usize) -> Found 
         }
         Err(error) => return Found::Unusable(format!("{}: {error}; baking anew.", path.display())),
     };
-    match decode(&bytes, key, count) {
+    match decode(&bytes, key, count.into()) {
         Ok(floats) => Found::Floats(floats),
         Err(reason) => Found::Unusable(format!("{}: {reason}; baking anew.", path.display())),
     }
@@ -136,7 +137,7 @@ fn encode(key: &Key, floats: &[f32]) -> Vec<u8> {
     [MAGIC, &key.hash().as_bytes()[..], &length, checksum.as_bytes(), payload].concat()
 }
 
-fn decode(bytes: &[u8], key: &Key, count: usize) -> Result<Vec<f32>, String> {
+fn decode(bytes: &[u8], key: &Key, count: Option<usize>) -> Result<Vec<f32>, String> {
     let (header, payload) = bytes.split_at_checked(HEADER).ok_or("shorter than its header")?;
     let (magic, header) = header.split_at(MAGIC.len());
     let (stored_key, header) = header.split_at(32);
@@ -147,8 +148,9 @@ fn decode(bytes: &[u8], key: &Key, count: usize) -> Result<Vec<f32>, String> {
     if stored_key != key.hash().as_bytes() {
         return Err("the bake of other inputs".to_owned());
     }
-    if length != (payload.len() as u64).to_le_bytes() || payload.len() != 4 * count {
-        return Err(format!("{} bytes of numbers, not {}", payload.len(), 4 * count));
+    let bytes = count.map_or(payload.len() / 4 * 4, |count| 4 * count);
+    if length != (payload.len() as u64).to_le_bytes() || payload.len() != bytes {
+        return Err(format!("{} bytes of numbers, not {bytes}", payload.len()));
     }
     if checksum != blake3::hash(payload).as_bytes() {
         return Err("damaged: the checksum differs".to_owned());

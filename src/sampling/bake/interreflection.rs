@@ -32,9 +32,9 @@ impl Found for Nearest {
 
 /// What a vertex gathers: of which vertices (by slot) what share of their light, rgb.
 pub(super) struct Gather {
-    shares: Vec<(u32, [f32; 3])>,
+    pub(super) shares: Vec<(u32, [f32; 3])>,
     /// The share of its rays that met a lit side of the mesh.
-    met: f32,
+    pub(super) met: f32,
 }
 
 impl Gather {
@@ -102,8 +102,8 @@ impl Gather {
 
 /// What each vertex of a mesh gathers of the others' light, whatever that is.
 pub struct VertexGather {
-    vertices: VertexRays,
-    gathers: Vec<Gather>,
+    pub(super) vertices: VertexRays,
+    pub(super) gathers: Vec<Gather>,
 }
 
 impl std::fmt::Debug for VertexGather {

@@ -15,13 +15,14 @@
 //! - [`thickness`]: how far below each vertex the mesh's far side lies
 //! - [`rays`]: the mesh as rays see it; `wide_bvh`: as many rays do, `packet` by packet; `cutouts`: where they go through
 //! - `between`: bakes of poses between two
-//! - [`cache`]: bakes kept between runs (`baker`: each bake through it)
+//! - [`cache`]: bakes kept between runs (`baker`: each bake through it; `gather_cache`: what vertices gather of one another)
 
 mod baker;
 mod between;
 pub mod cache;
 pub mod coefficients;
 mod cutouts;
+mod gather_cache;
 pub mod harmonics;
 pub mod interreflection;
 mod lobe_kernel;

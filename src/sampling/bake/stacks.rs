@@ -3,7 +3,7 @@
 use super::Illumination;
 use crate::model::cube::Cube;
 use crate::model::params::{Param, Params};
-use crate::specular::{SMOOTHEST, roughness_of};
+use crate::specular::{SMOOTHEST, glossy_paces, roughness_of};
 
 /// A stack of cubes over a lobe's sharpness, and where rules look it up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -58,6 +58,16 @@ impl Stack {
             Self::Specular => params.scalar(Param::SpecularLobe),
             Self::Reflected => params.scalar_named("roughness").max(SMOOTHEST),
             Self::Glossy => roughness_of(params.scalar_named("roughness"), params.scalar_named("gloss"), 1.0),
+        }
+    }
+
+    /// How fast that moves with each parameter that moves it, by their names.
+    #[must_use]
+    pub fn paces(self, params: &Params) -> Vec<(&'static str, f64)> {
+        match self {
+            Self::Specular => vec![(Param::SpecularLobe.name(), 1.0)],
+            Self::Reflected => vec![("roughness", 1.0)],
+            Self::Glossy => ["roughness", "gloss"].into_iter().zip(glossy_paces(params)).collect(),
         }
     }
 

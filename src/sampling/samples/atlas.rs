@@ -137,6 +137,22 @@ impl Atlas {
         self
     }
 
+    /// The same texels, whose records hold other numbers of a quantity: of `numbers` each covered texel has `width` together.
+    #[must_use]
+    pub fn with_quantity(&self, name: &str, width: usize, numbers: &[f32]) -> Self {
+        let mut made = self.clone();
+        let held = |row: &usize| self.inputs[*row].name == name;
+        let rows: Vec<usize> = (0..self.inputs.len()).filter(held).collect();
+        for slot in 0..self.covered().div_ceil(LANES) * LANES {
+            let texel = slot.min(self.covered() - 1);
+            for &row in &rows {
+                let number = numbers[texel * width + self.inputs[row].component];
+                made.rows.record_mut(slot / LANES)[row][slot % LANES] = number;
+            }
+        }
+        made
+    }
+
     /// Texels along a side.
     #[must_use]
     #[inline]

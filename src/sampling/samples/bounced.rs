@@ -3,6 +3,8 @@
 //! A light's shadowed irradiance at each vertex is gathered over the mesh, in two rounds, as the environment's is. The
 //! panorama's lights are part of the whole panorama there.
 
+use std::path::Path;
+
 use super::lit_mesh::VertexLamps;
 use super::sky::OfVertices;
 use super::supply::{Supplies, Supply};
@@ -19,11 +21,16 @@ use crate::scene::mesh::PosedMesh;
 /// from that: whoever makes samples of one pose again and again keeps it.
 #[must_use]
 pub fn gather_of(scene: &Scene, mesh: &PosedMesh) -> Option<VertexGather> {
-    gather_for(scene, mesh, scene.needs().fields)
+    gather_for(scene, mesh, scene.needs().fields, None)
 }
 
-/// As [`gather_of`], where `fields` are to be found.
-pub(super) fn gather_for(scene: &Scene, mesh: &PosedMesh, fields: Fields) -> Option<VertexGather> {
+/// As [`gather_of`], where `fields` are to be found; kept among the bakes of `cache`.
+pub(super) fn gather_for(
+    scene: &Scene,
+    mesh: &PosedMesh,
+    fields: Fields,
+    cache: Option<&Path>,
+) -> Option<VertexGather> {
     let gathered = scene.choices.bounces == Bounces::Gathered;
     let asks = |name: &str| fields.named(name).is_some();
     let by_rays = scene.choices.visibility == Visibility::Rays && asks(SKY_RATIO);
@@ -31,7 +38,7 @@ pub(super) fn gather_for(scene: &Scene, mesh: &PosedMesh, fields: Fields) -> Opt
     let of_skin = sees_skin(scene, fields);
     let gather = || {
         let albedo = Albedo { map: scene.maps.color.as_ref() };
-        VertexGather::new(mesh, scene.quality.occlusion_rays, &albedo)
+        VertexGather::kept(mesh, scene.quality.occlusion_rays, &albedo, cache)
     };
     (gathered && (by_rays || of_lamps) || of_skin).then(gather)
 }

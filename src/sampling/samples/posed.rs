@@ -1,5 +1,6 @@
 //! A scene's mesh in one pose with all that its samples and texels are made of.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -35,6 +36,8 @@ pub struct SurfaceBakes<'a> {
     pub thickness: Option<&'a VertexThickness>,
     /// What its vertices gather of one another ([`super::gather_of`]), where it is known already.
     pub gather: Option<&'a VertexGather>,
+    /// The folder of the bakes that are kept: of what vertices gather, too.
+    pub cache: Option<&'a Path>,
     /// The environment as specular lobes see it by rays, where it is known already.
     pub lobe_sky: Option<&'a Arc<LobeSky>>,
     /// The coarser levels of the scene's maps, where they are known already.
@@ -111,7 +114,8 @@ impl<'a> PosedSurface<'a> {
         fields: Fields,
     ) -> Result<Self, SampleError> {
         let mut supplies = lit::supplies(scene, mesh, rays);
-        let own = if bakes.gather.is_none() { bounced::gather_for(scene, mesh, fields) } else { None };
+        let make = || bounced::gather_for(scene, mesh, fields, bakes.cache);
+        let own = if bakes.gather.is_none() { make() } else { None };
         let gather = bakes.gather.or(own.as_ref());
         supplies.extend(bounced::supplies(scene, mesh, rays, gather, fields));
         supplies.extend(through::supplies(scene, mesh, rays, morphs, (bakes.thickness, fields))?);

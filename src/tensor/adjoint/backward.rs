@@ -6,9 +6,15 @@ use super::text::{HEAD, Text};
 use super::{Adjoint, AdjointError, Binding, Input, Lookup, Module, WORKGROUP};
 use crate::model::params::{Channels, Param};
 use crate::shader::Domain;
+use crate::shader::atlas::stored;
 use crate::shader::emit::with_haze;
 use crate::shader::module::uniform;
 use crate::shader::tangent::chain::{Chain, Seed};
+
+/// A column's parameter as a seed: cubes that it acts through, too, are inputs of their own.
+pub(crate) fn of_column(param: Param) -> Seed {
+    Seed { resources: Vec::new(), ..Seed::of_param(param) }
+}
 
 /// What becomes of a seed's tangent.
 #[derive(Clone, Copy, Debug)]
@@ -57,6 +63,7 @@ impl Adjoint {
         wgsl.push_str("    if (slot < part.slots) {\n    let pixel = vec4f(image_adjoint[4u * slot], image_adjoint[4u * slot + 1u], image_adjoint[4u * slot + 2u], image_adjoint[4u * slot + 3u]);\n");
         wgsl.push_str(&text.record());
         wgsl.push_str("        let adjoint = share * pixel;\n");
+        wgsl.push_str(&stored(&self.plan.levels));
         wgsl.push_str(&self.plan.calls(Domain::Fragment, uniform, |name| format!("at.{name}")));
         wgsl.push_str(&chain.shared);
         chain.lines.iter().for_each(|lines| wgsl.push_str(lines));
@@ -88,7 +95,17 @@ impl Adjoint {
                     columns().filter(move |(_, c)| c.param == param).map(|(k, _)| Gain::Column(k)).collect()
                 };
                 let params = columns().filter(|(k, _)| first(*k)).map(|(_, column)| column.param);
-                params.map(|param| (Seed::of_param(param), of(param))).collect()
+                params.map(|param| (of_column(param), of(param))).collect()
+            }
+            // What stands in a level may be no colour: number by number.
+            Input::Levels => {
+                let of = |(k, (level, component)): (usize, (usize, usize))| {
+                    let level = &self.plan.levels[level];
+                    let needed = self.plan.steps.iter().flat_map(|step| &step.rule.needs);
+                    let name = needed.map(|(need, _)| *need).find(|need| *need == level.name)?;
+                    Some((named(name, &level.unit(component)), vec![Gain::Field(input, Some(k))]))
+                };
+                self.looked_up().enumerate().filter_map(of).collect()
             }
             // Channels never mix: all three move at once.
             Input::Albedo => vec![(named("albedo", "vec3f(1.0)"), vec![Gain::Field(input, None)])],
@@ -129,7 +146,7 @@ impl Adjoint {
                 wgsl,
                 "        {}_gradient[{}u * s + {component}u] = dot(adjoint, {moved});",
                 input.name(),
-                input.width().unwrap_or(1)
+                self.width(input).unwrap_or(1)
             ),
             Gain::Light(index, place) => {
                 let _ = writeln!(wgsl, "        let gained_light{index} = adjoint * {moved};");

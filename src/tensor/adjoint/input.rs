@@ -27,6 +27,8 @@ pub enum Input {
     Reflected,
     /// E_r's texels with their border where it is white, RGBA.
     Glossy,
+    /// What each sample looks up of the UV atlas, level by level.
+    Levels,
 }
 
 /// How many inputs there are.
@@ -34,7 +36,7 @@ pub const INPUTS: usize = Input::ALL.len();
 
 impl Input {
     /// Every input.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Columns,
         Self::Albedo,
         Self::Specular,
@@ -46,6 +48,7 @@ impl Input {
         Self::Hilite,
         Self::Reflected,
         Self::Glossy,
+        Self::Levels,
     ];
 
     /// The name in messages; of a sample's field, that of the quantity too.
@@ -63,6 +66,7 @@ impl Input {
             Self::Hilite => "hilite",
             Self::Reflected => "reflected",
             Self::Glossy => "glossy",
+            Self::Levels => "levels",
         }
     }
 

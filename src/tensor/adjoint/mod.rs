@@ -12,6 +12,8 @@ mod constants;
 mod input;
 mod text;
 
+pub(crate) use self::backward::of_column;
+pub use self::constants::module_of;
 pub use self::input::{INPUTS, Input};
 
 use std::fmt::Write as _;
@@ -21,6 +23,7 @@ use crate::model::evaluate::Setup;
 use crate::model::params::{Column, Param};
 use crate::shader::Domain;
 use crate::shader::PlanError;
+use crate::shader::atlas::stored;
 use crate::shader::emit::{Plan, plan, sample_fields, shown};
 use crate::shader::facts::{Budget, Facts, MapFacts, Source};
 use crate::shader::module::uniform;
@@ -39,7 +42,7 @@ pub struct Lookup {
     pub cube: Input,
     /// The quantity that it yields, and its WGSL type.
     light: (&'static str, &'static str),
-    /// The quantity that says where on the faces; `None` where the rule itself finds the place, or a texel looks up.
+    /// The quantity that says where on the faces; `None` where the rule itself finds the place.
     place: Option<&'static str>,
 }
 
@@ -105,7 +108,7 @@ pub struct Module {
 /// The model over stored samples, in terms of tensors.
 #[derive(Clone, Debug)]
 pub struct Adjoint {
-    /// The rules.
+    /// The rules of samples.
     pub plan: Plan,
     /// The free columns, in the order of their tensor.
     pub columns: Vec<Column>,
@@ -121,16 +124,25 @@ pub enum AdjointError {
     /// A rule has no derivative.
     #[error(transparent)]
     Tangent(#[from] TangentError),
-    /// A column that acts through a cube.
+    /// A column that acts through a cube alone.
     #[error(
-        "{0} cannot be a free column here: it acts through cubes that are inputs of their own. Give the cubes of another \
+        "{0} cannot be a free column here: it acts through a cube that is an input of its own. Give the cube of another \
          lobe instead."
     )]
     Lobe(&'static str),
+    /// A cube that texels of an atlas look up.
+    #[error(
+        "No derivative by the cube `{cube}` of what is computed in the texels of an atlas: hold it there, or leave the effects \
+         out whose light stands there."
+    )]
+    CubeOfTexels {
+        /// The cube.
+        cube: &'static str,
+    },
     /// A cube whose texels have no derivative.
     #[error(
-        "No derivative by the cube `{cube}`: what makes {light} of it finds the place of its lookup itself, or looks it up for \
-         the texels of an atlas. Hold the cube, or give the rule the place alone, as a quantity whose name ends in `_place`."
+        "No derivative by the cube `{cube}`: what makes {light} of it finds the place of its lookup itself. Hold the cube, or give \
+         the rule the place alone, as a quantity whose name ends in `_place`."
     )]
     Cube {
         /// The cube.
@@ -140,10 +152,37 @@ pub enum AdjointError {
     },
 }
 
-/// Whether a parameter acts through cubes that are inputs of their own.
-#[must_use]
-pub fn is_sharpness(param: Param) -> bool {
-    matches!(param.name(), "specular_lobe" | "roughness" | "gloss")
+/// The rules of stored samples under those switches, and of the texels that they look up, with what columns that are free read
+/// beside.
+///
+/// # Errors
+/// When `specular_lobe` is free, or the planner yields nothing.
+pub fn plan_of(setup: Setup, columns: &[Column], turned: bool) -> Result<Plan, AdjointError> {
+    let free = |param: Param| columns.iter().any(|column| column.param == param);
+    if free(Param::SpecularLobe) {
+        return Err(AdjointError::Lobe(Param::SpecularLobe.name()));
+    }
+    let facts = Facts {
+        setup,
+        source: Source::Samples,
+        maps: MapFacts::default(),
+        turned: turned || free(Param::EnvironmentRotation),
+        atlas: setup.needs().atlas.then_some(1),
+        square_rim: false,
+        budget: Budget::Exact,
+        ..Facts::default()
+    };
+    let mut plan = plan(&facts)?;
+    if plan.constants.contains(&Constant::KeyDirection) {
+        for (param, slope) in
+            [(Param::KeyAzimuth, Constant::KeyByAzimuth), (Param::KeyElevation, Constant::KeyByElevation)]
+        {
+            if free(param) {
+                plan.constants.push(slope);
+            }
+        }
+    }
+    Ok(plan)
 }
 
 impl Adjoint {
@@ -151,33 +190,12 @@ impl Adjoint {
     /// rotation is free.
     ///
     /// # Errors
-    /// When a lobe's sharpness is free, or the planner yields nothing.
+    /// When `specular_lobe` is free, or the planner yields nothing.
     pub fn new(setup: Setup, columns: &[Column], turned: bool) -> Result<Self, AdjointError> {
-        let free = |param: Param| columns.iter().any(|column| column.param == param);
-        if let Some(param) = columns.iter().map(|column| column.param).find(|&param| is_sharpness(param)) {
-            return Err(AdjointError::Lobe(param.name()));
-        }
-        let facts = Facts {
-            setup,
-            source: Source::Samples,
-            maps: MapFacts::default(),
-            turned: turned || free(Param::EnvironmentRotation),
-            square_rim: false,
-            budget: Budget::Exact,
-            ..Facts::default()
-        };
-        let mut plan = plan(&facts)?;
-        if plan.constants.contains(&Constant::KeyDirection) {
-            for (param, slope) in
-                [(Param::KeyAzimuth, Constant::KeyByAzimuth), (Param::KeyElevation, Constant::KeyByElevation)]
-            {
-                if free(param) {
-                    plan.constants.push(slope);
-                }
-            }
-        }
-        let passes = plan.passes.iter().flat_map(|pass| &pass.plan.steps);
-        let lookups = plan.steps.iter().chain(passes).flat_map(|step| Lookup::of(step.rule)).collect();
+        let mut plan = plan_of(setup, columns, turned)?;
+        // Levels are an input of their own.
+        plan.passes.clear();
+        let lookups = plan.steps.iter().flat_map(|step| Lookup::of(step.rule)).collect();
         Ok(Self { plan, columns: columns.to_vec(), lookups })
     }
 
@@ -187,8 +205,22 @@ impl Adjoint {
         match (input.width(), input.faces()) {
             (Some(_), _) => sample_fields(&self.plan.facts).iter().any(|(name, _)| *name == input.name()),
             (_, Some(faces)) => self.plan.resources.contains(&faces),
+            _ if input == Input::Levels => !self.plan.levels.is_empty(),
             _ => !self.columns.is_empty(),
         }
+    }
+
+    /// How many numbers a sample has of an input, for those that are its fields.
+    #[must_use]
+    pub fn width(&self, input: Input) -> Option<usize> {
+        let of_levels = || self.plan.levels.iter().map(|level| components(level.kind)).sum();
+        if input == Input::Levels { Some(of_levels()) } else { input.width() }
+    }
+
+    /// The numbers of levels that a sample looks up, in the order of their tensor: each with the level's place among the plan's.
+    fn looked_up(&self) -> impl Iterator<Item = (usize, usize)> {
+        let levels = self.plan.levels.iter().enumerate();
+        levels.flat_map(|(level, of)| (0..components(of.kind)).map(move |component| (level, component)))
     }
 
     /// The fields of a sample that are no tensors, with how many numbers each has.
@@ -223,6 +255,7 @@ impl Adjoint {
         wgsl.push_str(HEAD);
         wgsl.push_str("    if (slot >= part.slots) {\n        return;\n    }\n    var shown = vec4f();\n");
         wgsl.push_str(&text.record());
+        wgsl.push_str(&stored(&self.plan.levels));
         wgsl.push_str(&self.plan.calls(Domain::Fragment, uniform, |name| format!("at.{name}")));
         let _ = writeln!(wgsl, "        shown += share * {};", shown(&self.plan.facts));
         wgsl.push_str("    }\n");

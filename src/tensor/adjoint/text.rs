@@ -17,7 +17,8 @@ pub(super) const HEAD: &str = "\n@compute @workgroup_size(64)\nfn cs_main(\n    
 
 impl<'a> Text<'a> {
     pub(super) fn new(adjoint: &'a Adjoint) -> Self {
-        let given = Input::ALL.into_iter().filter(|input| input.width().is_some() && adjoint.reads(*input));
+        let given =
+            Input::ALL.into_iter().filter(|&input| adjoint.width(input).is_some() && adjoint.reads(input));
         let bindings = [Binding::Part, Binding::Fixed, Binding::GroupStart];
         Self { adjoint, bindings: bindings.into_iter().chain(given.map(Binding::Given)).collect() }
     }
@@ -35,6 +36,9 @@ impl<'a> Text<'a> {
         wgsl.push_str("\nstruct Sample {\n");
         for (name, kind) in sample_fields(&self.adjoint.plan.facts) {
             let _ = writeln!(wgsl, "    {name}: {kind},");
+        }
+        for level in &self.adjoint.plan.levels {
+            let _ = writeln!(wgsl, "    {}: {},", level.name, level.kind);
         }
         wgsl.push_str("}\n\nstruct Part {\n    slots: u32,\n    samples: u32,\n}\n\n");
         for (i, binding) in self.bindings.iter().enumerate() {
@@ -75,6 +79,15 @@ impl<'a> Text<'a> {
             if Input::of_field(name).is_none() {
                 plane += count;
             }
+        }
+        let width = self.adjoint.width(Input::Levels).unwrap_or(0);
+        let mut first = 0;
+        for level in &self.adjoint.plan.levels {
+            let count = components(level.kind);
+            let numbers: Vec<String> =
+                (first..first + count).map(|k| format!("given_levels[{width}u * s + {k}u]")).collect();
+            let _ = writeln!(wgsl, "        at.{} = {}({});", level.name, level.kind, numbers.join(", "));
+            first += count;
         }
         let _ = writeln!(wgsl, "        let share = fixed_planes[{plane}u * part.samples + s];");
         wgsl

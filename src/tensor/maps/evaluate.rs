@@ -6,15 +6,16 @@ use burn::tensor::{Tensor, TensorData};
 use super::MapError;
 use super::fit::{column_tensor, cube_tensor};
 use super::function::MapGradients;
-use super::layer::Layer;
+use super::layer::{Layer, slot};
 use super::pixels::Part;
 use super::problem::read;
-use crate::bake::LobeStack;
+use crate::bake::Illumination;
+use crate::bake::stacks::Stack;
 use crate::engine::{Point, Unknown};
 use crate::model::cube::Cube;
 use crate::model::gain::Gain;
-use crate::model::params::{Column, Param};
-use crate::{Inputs, SharedDevice, TensorError};
+use crate::model::params::{Column, Param, Params};
+use crate::{Input, Inputs, Levels, SharedDevice, TensorError};
 
 /// What images follow.
 pub(super) struct Variables {
@@ -22,20 +23,24 @@ pub(super) struct Variables {
     pub(super) layers: Vec<Layer>,
     /// The free columns, but for the exponent of the specular cube.
     pub(super) columns: Vec<Column>,
-    /// What that cube is made of, where its exponent is free.
-    pub(super) lobes: Option<LobeStack>,
+    /// The stacks whose cubes free constants choose.
+    pub(super) stacks: Vec<Stack>,
+    pub(super) illumination: Illumination,
+    /// What makes the levels that samples look up of the UV atlas, and what it takes at the start.
+    pub(super) levels: Option<(Levels, Inputs)>,
 }
 
 /// A point of them, and the gradients that are added up there.
 pub(super) struct Evaluation<'a> {
     of: &'a Variables,
     tensors: Tensors,
-    /// How the specular cube moves with its exponent, where that is free.
-    lobe_slope: Option<Cube<f32>>,
+    params: Params,
+    /// How each stack's cube moves with the place that it is taken at.
+    cube_slopes: Vec<Cube<f32>>,
     /// Of each view.
     gains: Vec<Gain>,
     columns: Option<Tensor<1>>,
-    lobe: Option<Tensor<2>>,
+    cubes: Vec<Option<Tensor<2>>>,
     texels: Vec<Option<Tensor<2>>>,
     /// By each view's gain, channel by channel.
     by_gain: Vec<[f64; 4]>,
@@ -45,8 +50,8 @@ pub(super) struct Evaluation<'a> {
 struct Tensors {
     /// The free columns: \[K\].
     columns: Tensor<1>,
-    /// The specular cube at its exponent, where that is free: \[texels with borders, 4\].
-    lobe: Option<Tensor<2>>,
+    /// Each stack's cube at its place: \[texels with borders, 4\].
+    cubes: Vec<(Input, Tensor<2>)>,
     /// Each layer's texels: \[texels, channels\].
     texels: Vec<Tensor<2>>,
 }
@@ -70,20 +75,20 @@ impl Variables {
             Ok(self.matrix(numbers, layer.start.dims()))
         });
         let texels = texels.collect::<Result<_, MapError>>()?;
-        let exponent = point.params.scalar(Param::SpecularLobe);
-        let (lobe, lobe_slope) = self.lobes.as_ref().map(|stack| stack.at(exponent)).unzip();
-        let tensors = Tensors {
-            columns: column_tensor(&self.shared, &self.columns, point),
-            lobe: lobe.map(|cube| cube_tensor(&self.shared, &cube)),
-            texels,
-        };
+        let chosen = self.stacks.iter().filter_map(|stack| {
+            let (cube, slope) = stack.at(&self.illumination, stack.place(&point.params))?;
+            Some(((input_of(*stack), cube_tensor(&self.shared, &cube)), slope))
+        });
+        let (cubes, cube_slopes): (Vec<_>, Vec<_>) = chosen.unzip();
+        let tensors = Tensors { columns: column_tensor(&self.shared, &self.columns, point), cubes, texels };
         Ok(Evaluation {
             of: self,
             tensors,
-            lobe_slope,
+            params: point.params.clone(),
+            cubes: vec![None; cube_slopes.len()],
+            cube_slopes,
             gains: (0..views).map(|view| point.gains.get(view).copied().unwrap_or_default()).collect(),
             columns: None,
-            lobe: None,
             texels: vec![None; self.layers.len()],
             by_gain: vec![[0.0; 4]; views],
         })
@@ -105,7 +110,7 @@ impl Evaluation<'_> {
     /// # Errors
     /// When the device does not give it.
     pub(super) fn image(&self, index: usize, part: &Part) -> Result<Vec<f32>, TensorError> {
-        read(part.shade.image(self.tensors.inputs(index, part, &self.of.layers)?)?)
+        read(part.shade.image(self.tensors.inputs(index, part, self.of)?)?)
     }
 
     /// Add the gradient of a part's image, gain included, times the slopes that `slopes` makes of the image without it.
@@ -119,7 +124,7 @@ impl Evaluation<'_> {
         slopes: impl FnOnce(&[f32]) -> Vec<[f64; 4]>,
     ) -> Result<(), TensorError> {
         let tracked = self.tensors.tracked();
-        let image = part.shade.image(tracked.inputs(index, part, &self.of.layers)?)?;
+        let image = part.shade.image(tracked.inputs(index, part, self.of)?)?;
         let numbers = read(image.clone().without_autodiff())?;
         let gain = self.gains[part.view].channels();
         let mut adjoint = Vec::with_capacity(numbers.len());
@@ -140,7 +145,9 @@ impl Evaluation<'_> {
     fn add(&mut self, tracked: &Tensors, number: &Tensor<1>) {
         let gradients = number.backward();
         plus(&mut self.columns, tracked.columns.grad(&gradients));
-        plus(&mut self.lobe, tracked.lobe.as_ref().and_then(|lobe| lobe.grad(&gradients)));
+        for (sum, (_, cube)) in self.cubes.iter_mut().zip(&tracked.cubes) {
+            plus(sum, cube.grad(&gradients));
+        }
         for (sum, texels) in self.texels.iter_mut().zip(&tracked.texels) {
             plus(sum, texels.grad(&gradients));
         }
@@ -151,29 +158,38 @@ impl Evaluation<'_> {
     /// # Errors
     /// When the device does not give it.
     pub(super) fn gradients(self, unknowns: &[Unknown]) -> Result<MapGradients, TensorError> {
-        let Self { of, lobe_slope, columns, lobe, texels, by_gain, .. } = self;
+        let Self { of, params, cube_slopes, columns, cubes, texels, by_gain, .. } = self;
         let columns = columns.map_or(Ok(Vec::new()), read)?;
-        let exponent = match (lobe, lobe_slope) {
+        // By the place that each stack's cube is taken at.
+        let by_place = |(cube, slope): (Option<Tensor<2>>, Cube<f32>)| -> Result<f64, TensorError> {
+            let Some(cube) = cube else { return Ok(0.0) };
             // Not burn's sum, which adds in the order in which threads come.
-            (Some(lobe), Some(slope)) => {
-                let pairs = read(lobe)?.into_iter().zip(slope.padded().as_flattened());
-                pairs.map(|(a, &b)| f64::from(a) * f64::from(b)).sum()
-            }
-            _ => 0.0,
+            let pairs = read(cube)?.into_iter().zip(slope.padded().as_flattened());
+            Ok(pairs.map(|(a, &b)| f64::from(a) * f64::from(b)).sum())
+        };
+        let by_places: Vec<f64> =
+            cubes.into_iter().zip(cube_slopes).map(by_place).collect::<Result<_, _>>()?;
+        let paces: Vec<_> = of.stacks.iter().map(|stack| stack.paces(&params)).collect();
+        let by_cubes = |param: Param| -> f64 {
+            let by = |(slope, paces): (&f64, &Vec<(&str, f64)>)| {
+                paces
+                    .iter()
+                    .filter(|(name, _)| *name == param.name())
+                    .map(|(_, pace)| slope * pace)
+                    .sum::<f64>()
+            };
+            by_places.iter().zip(&paces).map(by).sum()
         };
         let by_column = |column: &Column| {
             let place = of.columns.iter().position(|other| other == column);
             let slope = place.and_then(|place| columns.get(place));
-            slope.map_or(0.0, |&slope| f64::from(slope))
+            slope.map_or(0.0, |&slope| f64::from(slope)) + by_cubes(column.param)
         };
         let constant = |unknown: &Unknown| match unknown {
             Unknown::Gain(view, _) => {
                 (0..4).filter(|&c| unknown.is_gain_of(*view, c)).map(|c| by_gain[*view][c]).sum()
             }
-            Unknown::Param(column) | Unknown::Own(_, column) => match column.param {
-                Param::SpecularLobe => exponent,
-                _ => by_column(column),
-            },
+            Unknown::Param(column) | Unknown::Own(_, column) => by_column(column),
         };
         let of_layer = |(sum, layer): (Option<Tensor<2>>, &Layer)| {
             sum.map_or_else(|| Ok(vec![0.0; layer.numbers()]), read)
@@ -194,21 +210,35 @@ impl Tensors {
         let matrix = |tensor: &Tensor<2>| tensor.clone().autodiff().require_grad();
         Self {
             columns: self.columns.clone().autodiff().require_grad(),
-            lobe: self.lobe.as_ref().map(matrix),
+            cubes: self.cubes.iter().map(|(input, cube)| (*input, matrix(cube))).collect(),
             texels: self.texels.iter().map(matrix).collect(),
         }
     }
 
     /// What the shading operation takes of a part of the samples.
-    fn inputs(&self, index: usize, part: &Part, layers: &[Layer]) -> Result<Inputs, TensorError> {
+    fn inputs(&self, index: usize, part: &Part, of: &Variables) -> Result<Inputs, TensorError> {
         let mut inputs = Inputs { columns: self.columns.clone(), ..part.inputs.clone() };
-        if let Some(lobe) = &self.lobe {
-            inputs.lobe = lobe.clone();
-        }
-        for (layer, texels) in layers.iter().zip(&self.texels) {
+        self.cubes.iter().for_each(|(input, cube)| *slot(*input, &mut inputs) = cube.clone());
+        for (layer, texels) in of.layers.iter().zip(&self.texels) {
             layer.show(index, texels.clone(), &mut inputs)?;
         }
+        if let Some((levels, start)) = &of.levels {
+            let mut own = Inputs { columns: self.columns.clone(), ..start.clone() };
+            for (layer, texels) in of.layers.iter().zip(&self.texels) {
+                layer.show_atlas(texels.clone(), &mut own)?;
+            }
+            inputs.levels = levels.make(own)?;
+        }
         Ok(inputs)
+    }
+}
+
+/// Which input a stack's cube is.
+pub(super) const fn input_of(stack: Stack) -> Input {
+    match stack {
+        Stack::Specular => Input::Lobe,
+        Stack::Reflected => Input::Reflected,
+        Stack::Glossy => Input::Glossy,
     }
 }
 

@@ -6,14 +6,15 @@ use std::time::Instant;
 
 use burn::tensor::{Tensor, TensorData};
 
+use super::evaluate::input_of;
 use super::layer::Layer;
 use super::layers::{layers, take_back};
 use super::parts::{cuts, most_samples, shades};
 use super::problem::{Observed, Problem};
 use super::task::MapTask;
 use super::{MapError, adam, cg};
-use crate::adjoint::is_sharpness;
 use crate::bake::Illumination;
+use crate::bake::stacks::Stack;
 use crate::engine::cpu::CpuEngine;
 use crate::engine::view::ObservedView;
 use crate::engine::{Point, Task, Unknown};
@@ -71,9 +72,8 @@ pub fn fit_maps(
     told: &mut dyn FnMut(&MapStep),
 ) -> Result<FittedMaps, MapError> {
     let clock = Instant::now();
-    // Told before the constants are fitted, which takes a while. E_s follows its exponent, cube by cube; no other cube
-    // does.
-    task.check(|param| is_sharpness(param) && param != Param::SpecularLobe)?;
+    // Told before the constants are fitted, which takes a while.
+    task.check()?;
     let fixed = Fixed::of(&task);
     let (initial, _) = fixed.solve_constants(&task.illumination, &task.observed, &task.start)?;
     let problem = problem(shared, &task, &fixed, &initial)?;
@@ -121,8 +121,10 @@ fn problem(
     let shaded = Shaded { setup: *setup, params: &initial.params, columns, illumination: &task.illumination };
     let parts = shades(shared, &shaded, &views, &cuts)?;
     let reads = |input: Input| parts.iter().all(|(shade, _)| shade.reads(input));
-    let layers = layers(shared, task, &cuts, &reads, initial.params.scalar(Param::SpecularLobe))?;
-    Ok(Problem::new(shared, parts, layers)?)
+    let levels = parts.iter().find_map(|(shade, _)| shade.levels()).cloned();
+    let lobe = initial.params.scalar(Param::SpecularLobe);
+    let layers = layers(shared, task, &cuts, &reads, (lobe, levels.as_ref().map(|(levels, _)| levels)))?;
+    Ok(Problem::new(shared, parts, layers, levels)?)
 }
 
 /// What is the same in every round.
@@ -230,10 +232,12 @@ impl Rounds<'_, '_> {
             self.fixed.solve_constants(&self.illumination, &self.observed, &self.constants)?;
         self.constants = next;
         let columns = column_tensor(self.shared, &self.fixed.columns, &self.constants);
-        let exponent = self.constants.params.scalar(Param::SpecularLobe);
-        let lobes = self.illumination.lobes.as_ref();
-        let lobe = lobes.map(|stack| cube_tensor(self.shared, &stack.at(exponent).0));
-        self.problem.set_constants(&columns, lobe.as_ref());
+        let cube = |stack: Stack| {
+            let (cube, _) = stack.at(&self.illumination, stack.place(&self.constants.params))?;
+            Some((input_of(stack), cube_tensor(self.shared, &cube)))
+        };
+        let cubes: Vec<_> = Stack::ALL.into_iter().filter_map(cube).collect();
+        self.problem.set_constants(&columns, &cubes)?;
         self.step(round, "constants", losses, 0.0);
         Ok(())
     }
@@ -246,12 +250,12 @@ impl Rounds<'_, '_> {
     }
 }
 
-/// Every parameter but those of lobes' sharpness, each channel its own.
+/// Every parameter but the exponent of E_s, which acts through its cube alone; each channel its own.
 fn all_columns() -> Vec<Column> {
     let of = |param: Param| {
         if param.info().rgb { Column::per_channel(param).to_vec() } else { vec![Column::tied(param)] }
     };
-    Param::all().filter(|&param| !is_sharpness(param)).flat_map(of).collect()
+    Param::all().filter(|&param| param != Param::SpecularLobe).flat_map(of).collect()
 }
 
 /// The columns' values.

@@ -1,14 +1,15 @@
 //! Images, and the loss of all of them, as functions of constants and whole maps, with gradients: lists of numbers in and
 //! out, for solvers that know nothing of burn's tensors.
 
-use super::evaluate::Variables;
+use super::evaluate::{Variables, input_of};
 use super::layer::{Grid, Layer};
 use super::layers::layers;
 use super::parts::{cuts_of_one_view, most_samples, shades};
 use super::pixels::{Part, View};
 use super::problem::read;
 use super::{MapError, MapTask};
-use crate::adjoint::is_sharpness;
+use crate::adjoint::AdjointError;
+use crate::bake::stacks::Stack;
 use crate::engine::residual::Residuals;
 use crate::engine::{Point, Unknown};
 use crate::model::params::{Column, Param};
@@ -59,15 +60,14 @@ impl MapFunction {
     /// Of the task's maps and of what it has free. The loss is that of the scene's fit, without priors.
     ///
     /// # Errors
-    /// When no effect reads a map, a constant is free that acts through cubes which are held or are maps themselves, or the
-    /// device does not take it.
+    /// When no effect reads a map, a constant is free that acts through a cube which is a map itself, or the device does not
+    /// take it.
     pub fn new(shared: &SharedDevice, task: MapTask<'_>) -> Result<Self, MapError> {
-        task.check(|param| acts_through_cubes(param, &task.kinds))?;
+        task.check()?;
         let setup = task.scene.setup();
-        // The exponent moves a cube, which is an input of its own.
-        let free = task.unknowns.iter().filter_map(Unknown::column);
-        let (exponent, columns): (Vec<Column>, Vec<Column>) =
-            free.partition(|column| column.param == Param::SpecularLobe);
+        let free = || task.unknowns.iter().filter_map(Unknown::column);
+        // The exponent moves a cube alone, which is an input of its own.
+        let columns: Vec<Column> = free().filter(|column| column.param != Param::SpecularLobe).collect();
         let samples: Vec<&ViewSamples> = task.observed.iter().map(|view| &view.samples).collect();
         let most = task.most_samples.unwrap_or_else(|| most_samples(shared, setup.needs().fields));
         let mut cuts = cuts_of_one_view(&samples, most);
@@ -77,8 +77,23 @@ impl MapFunction {
         let shaded = Shaded { setup, params, columns: &columns, illumination: &task.illumination };
         let shades = shades(shared, &shaded, &samples, &cuts)?;
         let reads = |input: Input| shades.iter().all(|(shade, _)| shade.reads(input));
-        let layers = layers(shared, &task, &cuts, &reads, params.scalar(Param::SpecularLobe))?;
-        let lobes = task.illumination.lobes.filter(|_| !exponent.is_empty() && reads(Input::Lobe));
+        let levels = shades.iter().find_map(|(shade, _)| shade.levels()).cloned();
+        let exponent = params.scalar(Param::SpecularLobe);
+        let layers =
+            layers(shared, &task, &cuts, &reads, (exponent, levels.as_ref().map(|(levels, _)| levels)))?;
+        let moves = |stack: &Stack| {
+            let paces = stack.paces(params);
+            free().any(|column| paces.iter().any(|(name, _)| *name == column.param.name()))
+        };
+        let in_texels =
+            |stack: &&Stack| levels.as_ref().is_some_and(|(levels, _)| levels.reads(input_of(**stack)));
+        if let Some(stack) = Stack::ALL.iter().filter(|stack| moves(stack)).find(in_texels) {
+            let cube = input_of(*stack).name();
+            return Err(TensorError::from(AdjointError::CubeOfTexels { cube }).into());
+        }
+        let baked = |stack: &Stack| stack.at(&task.illumination, stack.place(params)).is_some();
+        let chosen = |stack: &Stack| reads(input_of(*stack)) && moves(stack) && baked(stack);
+        let stacks = Stack::ALL.into_iter().filter(chosen).collect();
         let parts = cuts.iter().zip(shades).filter_map(|(cut, shade)| Part::new(cut, shade)).collect();
         let cameras = task.scene.views.iter().map(|view| &view.camera);
         let pixels = cameras.map(|camera| camera.width as usize * camera.height as usize);
@@ -87,7 +102,14 @@ impl MapFunction {
             .map(|(i, (observed, pixels))| View::new(observed, pixels, task.held_out != Some(i)))
             .collect();
         Ok(Self {
-            variables: Variables { shared: shared.clone(), layers, columns, lobes },
+            variables: Variables {
+                shared: shared.clone(),
+                layers,
+                columns,
+                stacks,
+                illumination: task.illumination,
+                levels,
+            },
             parts,
             weight: views.iter().map(View::weight).sum::<f64>().max(f64::MIN_POSITIVE),
             views,
@@ -216,10 +238,10 @@ impl MapFunction {
     }
 }
 
-/// Whether a constant acts through cubes that are held beside maps of these kinds, or are such maps.
+/// Whether a constant acts through a cube that is itself a map of these kinds.
 #[must_use]
 pub fn acts_through_cubes(param: Param, kinds: &[MapKind]) -> bool {
-    is_sharpness(param) && (param != Param::SpecularLobe || kinds.contains(&MapKind::Environment))
+    param == Param::SpecularLobe && kinds.contains(&MapKind::Environment)
 }
 
 impl MapInfo {

@@ -34,6 +34,8 @@ pub struct Layer {
     pub grid: Grid,
     /// From texels to the input, a matrix for each part of the samples; a cube's are all the same.
     pub footprints: Vec<Sparse>,
+    /// From texels to those of the UV atlas, where what is computed there reads the input.
+    pub in_atlas: Option<Sparse>,
     /// From texels to the differences of neighbours.
     pub differences: Sparse,
     /// Of each texel, how many neighbours it has: \[texels, 1\].
@@ -57,6 +59,8 @@ pub struct LayerParts {
     pub grid: Grid,
     /// From texels to the input.
     pub footprint: Entries,
+    /// From texels to those of the UV atlas, where what is computed there reads the input.
+    pub in_atlas: Option<Entries>,
     /// Neighbouring texels, each pair once.
     pub pairs: Vec<[u32; 2]>,
     /// The texels' numbers at the start, channel by channel within each.
@@ -86,6 +90,7 @@ impl Layer {
             name: parts.name,
             input: parts.input,
             grid: parts.grid,
+            in_atlas: parts.in_atlas.map(|entries| Sparse::new(shared, &entries)).transpose()?,
             footprints: footprints(shared, parts.grid, &parts.footprint, cuts)?,
             differences: Sparse::new(shared, &differences)?,
             neighbours: matrix(neighbours, 1),
@@ -108,6 +113,18 @@ impl Layer {
     /// When the device does not take it.
     pub fn show(&self, part: usize, texels: Tensor<2>, inputs: &mut Inputs) -> Result<(), TensorError> {
         *slot(self.input, inputs) = self.footprints[part].apply(texels)?;
+        Ok(())
+    }
+
+    /// Put what `texels` show to those of the UV atlas in the place of their input; nothing where what is computed there does
+    /// not read it.
+    ///
+    /// # Errors
+    /// When the device does not take it.
+    pub fn show_atlas(&self, texels: Tensor<2>, inputs: &mut Inputs) -> Result<(), TensorError> {
+        if let Some(in_atlas) = &self.in_atlas {
+            *slot(self.input, inputs) = in_atlas.apply(texels)?;
+        }
         Ok(())
     }
 
@@ -147,7 +164,7 @@ fn footprints(
 }
 
 /// The tensor of an input that is a matrix.
-fn slot(input: Input, inputs: &mut Inputs) -> &mut Tensor<2> {
+pub(super) fn slot(input: Input, inputs: &mut Inputs) -> &mut Tensor<2> {
     match input {
         Input::Albedo => &mut inputs.albedo,
         Input::Specular => &mut inputs.specular,
@@ -158,7 +175,7 @@ fn slot(input: Input, inputs: &mut Inputs) -> &mut Tensor<2> {
         Input::Hilite => &mut inputs.hilite,
         Input::Reflected => &mut inputs.reflected,
         Input::Glossy => &mut inputs.glossy,
-        // A column is no map.
-        Input::Bump | Input::Columns => &mut inputs.bump,
+        // Columns and levels are no maps.
+        Input::Bump | Input::Columns | Input::Levels => &mut inputs.bump,
     }
 }

@@ -1,5 +1,7 @@
 //! The layers that a fit of maps begins with, and what they show, for the fit of the constants.
 
+use std::sync::Arc;
+
 use super::MapError;
 use super::layer::{Grid, Layer, LayerParts};
 use super::parts::Cut;
@@ -10,11 +12,15 @@ use crate::bake::{Illumination, LobeStack};
 use crate::engine::Point;
 use crate::engine::view::ObservedView;
 use crate::footprint::{cube_border, cube_pairs, edges, texel_pairs, texels, vertices};
+use crate::levels::HELD;
 use crate::model::cube::Cube;
+use crate::model::effects::Effect;
 use crate::model::params::Param;
+use crate::samples::atlas::listed;
 use crate::samples::{Hit, sample_hits};
 use crate::scene::MapKind;
-use crate::{Input, SharedDevice};
+use crate::shader::term::of_texels;
+use crate::{Input, Levels, SharedDevice, TensorError};
 
 /// Texels along a side of a map that the scene leaves out, where there is no other to go by.
 const MADE_SIZE: usize = 512;
@@ -29,7 +35,7 @@ pub fn layers(
     task: &MapTask<'_>,
     cuts: &[Cut],
     reads: &dyn Fn(Input) -> bool,
-    lobe: f64,
+    (lobe, levels): (f64, Option<&Levels>),
 ) -> Result<Vec<Layer>, MapError> {
     let scene = task.scene;
     let rays = RayMesh::new(&task.posed.positions, &task.posed.triangles);
@@ -41,9 +47,19 @@ pub fn layers(
     if let Some(effect) = beside.filter(|_| task.kinds.contains(&MapKind::Environment)) {
         return Err(MapError::Beside { map: MapKind::Environment.name(), effect: effect.name() });
     }
+    let in_texels = |input: Input| levels.is_some_and(|levels| levels.reads(input));
+    let in_atlas = levels.map_or_else(|| Ok(Vec::new()), |_| atlas_hits(task))?;
     for &kind in &task.kinds {
-        let parts = parts(task, kind, &hits, lobe);
-        let read: Vec<LayerParts> = parts.into_iter().filter(|parts| reads(parts.input)).collect();
+        let parts = parts(task, kind, (&hits, &in_atlas), lobe).into_iter();
+        let read = parts.filter(|parts| reads(parts.input) || in_texels(parts.input));
+        let mut read: Vec<LayerParts> = read.collect();
+        for parts in &mut read {
+            parts.in_atlas = parts.in_atlas.take().filter(|_| in_texels(parts.input));
+            if matches!(parts.grid, Grid::Cube(_)) && in_texels(parts.input) {
+                let effect = of_texels(scene.effects).map_or("", Effect::name);
+                return Err(MapError::InTexels { map: kind.name(), effect });
+            }
+        }
         if read.is_empty() {
             return Err(MapError::Unread { map: kind.name(), effects: kind.effects() });
         }
@@ -66,19 +82,34 @@ pub fn layers(
     Ok(layers)
 }
 
-/// What the layers of a kind are made of.
-fn parts(task: &MapTask<'_>, kind: MapKind, hits: &[Hit], lobe: f64) -> Vec<LayerParts> {
+/// The points of the mesh at the texels of the UV atlas that it covers.
+fn atlas_hits(task: &MapTask<'_>) -> Result<Vec<Hit>, MapError> {
+    let MapTask { scene, posed, .. } = task;
+    let listed = listed(posed.atlas_uvs(), &posed.skin_triangles(), scene.diffusion.light_map_size);
+    let listed = listed.map_err(|_| TensorError::no_atlas(scene.effects))?;
+    Ok(listed.into_iter().map(|at| Hit { triangle: at.triangle, barycentric: at.shares }).collect())
+}
+
+/// What the layers of a kind are made of; samples show those points of the mesh, and the UV atlas' texels these.
+fn parts(
+    task: &MapTask<'_>,
+    kind: MapKind,
+    (hits, in_atlas): (&[Hit], &[Hit]),
+    lobe: f64,
+) -> Vec<LayerParts> {
     let maps = &task.scene.maps;
     let prior = task.scene.fit.maps.prior(kind);
     let colour_size = maps.color.as_ref().map_or((MADE_SIZE, MADE_SIZE), |map| (map.width, map.height));
     let texture = |input: Input, size: Option<(usize, usize)>, start: Option<Vec<f32>>| {
         let (width, height) = size.unwrap_or(colour_size);
         let channels = input.width().unwrap_or(1);
+        let at = |hits: &[Hit]| texels(width, height, hits.iter().map(|hit| hit.uv(task.posed)));
         LayerParts {
             name: kind.name(),
             input,
             grid: Grid::Texels { width, height },
-            footprint: texels(width, height, hits.iter().map(|hit| hit.uv(task.posed))),
+            footprint: at(hits),
+            in_atlas: Some(at(in_atlas)),
             pairs: texel_pairs(width, height),
             // The neutral value of a map that the scene leaves out.
             start: start.unwrap_or_else(|| vec![1.0; width * height * channels]),
@@ -97,6 +128,7 @@ fn parts(task: &MapTask<'_>, kind: MapKind, hits: &[Hit], lobe: f64) -> Vec<Laye
             input,
             grid: Grid::Cube(size),
             footprint: cube_border(size),
+            in_atlas: None,
             pairs: cube_pairs(size),
             start: cube_texels(cube),
             prior,
@@ -116,6 +148,7 @@ fn parts(task: &MapTask<'_>, kind: MapKind, hits: &[Hit], lobe: f64) -> Vec<Laye
                 input: Input::Open,
                 grid: Grid::Vertices(count),
                 footprint: vertices(count, &task.posed.triangles, hits),
+                in_atlas: Some(vertices(count, &task.posed.triangles, in_atlas)),
                 pairs: edges(&task.posed.triangles),
                 start: task.open.clone().unwrap_or_else(|| vec![1.0; count]),
                 prior,
@@ -141,6 +174,20 @@ fn cube_texels(cube: &Cube<f32>) -> Vec<f32> {
     let size = cube.size();
     let places = (0..6 * size * size).map(|i| (i / (size * size), i % size, i / size % size));
     places.flat_map(|(face, column, row)| cube.texel(face, column, row)).collect()
+}
+
+/// Take what a layer shows to the texels of the UV atlas back to the one that the views share.
+fn take_back_to_atlas(layer: &Layer, observed: &mut [ObservedView]) -> Result<(), MapError> {
+    let Some(in_atlas) = &layer.in_atlas else { return Ok(()) };
+    let held = HELD.iter().find(|(input, _)| *input == layer.input);
+    let atlas = observed.iter().find_map(|view| view.samples.atlas.as_ref());
+    if let (Some((_, name)), Some(atlas)) = (held, atlas) {
+        let numbers = read(in_atlas.apply(layer.value.clone())?)?;
+        let width = layer.input.width().unwrap_or(1);
+        let atlas = Arc::new(atlas.with_quantity(name, width, &numbers));
+        observed.iter_mut().for_each(|view| view.samples.atlas = Some(Arc::clone(&atlas)));
+    }
+    Ok(())
 }
 
 /// Take what the layers show back to the samples and cubes that the constants are fitted with.
@@ -170,6 +217,7 @@ pub fn take_back(
             }
             continue;
         }
+        take_back_to_atlas(layer, observed)?;
         let mut numbers = Vec::new();
         for footprint in &layer.footprints {
             numbers.extend(read(footprint.apply(layer.value.clone())?)?);

@@ -45,7 +45,7 @@ pub enum MapError {
     Tensor(TensorError),
     /// A map, or what is looked up for it, is beyond what one buffer of the device holds.
     #[error(
-        "adapter {adapter}: the buffer of the {what} takes {bytes} bytes, but one may have {limit} at most there. Scale the maps down, lower samples_per_axis in [quality], or choose an adapter with larger buffers."
+        "adapter {adapter}: the buffer of the {what} takes {bytes} bytes, but one may have {limit} at most there. Scale the maps down, lower samples_per_axis in [quality] or light_map_size in [diffusion], or choose an adapter with larger buffers."
     )]
     TooLarge {
         /// The adapter.
@@ -71,10 +71,10 @@ pub enum MapError {
     /// The rules cannot be computed on the processor.
     #[error(transparent)]
     Shading(#[from] ShadingError),
-    /// A free constant that acts through cubes which tensors hold.
+    /// A free constant that acts through a cube which is fitted itself.
     #[error(
-        "{param} cannot be fitted beside maps: it acts through cubes that were baked before, and the maps would be fitted to \
-         where it began. Hold it, or fit it without maps."
+        "{param} cannot be fitted beside the environment: it acts through a cube whose texels are fitted themselves. Hold it, or \
+         leave the environment out."
     )]
     Sharpness {
         /// The parameter's name.
@@ -85,6 +85,17 @@ pub enum MapError {
         "{map} cannot be fitted beside the effect {effect}, which sees the environment by other bakes than its cubes. Leave one of them out."
     )]
     Beside {
+        /// The map's name.
+        map: &'static str,
+        /// The effect.
+        effect: &'static str,
+    },
+    /// Light that texels of the UV atlas see by the fitted cubes.
+    #[error(
+        "{map} cannot be fitted beside the effect {effect}: the texels that its light stands in hold the environment that they \
+         begin with. Leave one of them out."
+    )]
+    InTexels {
         /// The map's name.
         map: &'static str,
         /// The effect.

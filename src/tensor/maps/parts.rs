@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use crate::model::fields::Fields;
 use crate::samples::{LANES, ViewSamples};
-use crate::{Inputs, Scatter, Shade, Shaded, SharedDevice, TensorError};
+use crate::{Inputs, Levels, Scatter, Shade, Shaded, SharedDevice, TensorError};
 
 /// Bytes that a sample takes in the largest buffer: base, view, normal, three corners' silhouettes and shares, a normal
 /// for the dapple, and the sample's share, 19 numbers of 32 bits at most, beside what files of rules declare.
@@ -72,10 +72,11 @@ pub fn shades(
     views: &[&ViewSamples],
     cuts: &[Cut],
 ) -> Result<Vec<(Shade, Inputs)>, TensorError> {
+    let levels = Levels::of_views(shared, shaded, views, Scatter::Exact)?;
     let shade = |cut: &Cut| {
         let part = cut.views(views);
         let part: Vec<&ViewSamples> = part.iter().map(AsRef::as_ref).collect();
-        Shade::new(shared, shaded, &part, Scatter::Exact)
+        Shade::build(shared, shaded, &part, (None, levels.as_ref()), Scatter::Exact)
     };
     cuts.iter().map(shade).collect()
 }

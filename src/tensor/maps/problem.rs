@@ -6,14 +6,14 @@
 use burn::tensor::{Tensor, TensorData};
 
 use super::MapError;
-use super::layer::Layer;
+use super::layer::{Layer, slot};
 use crate::engine::residual::{Residuals, Weighted};
 use crate::engine::view::ObservedView;
 use crate::model::batch::Batch;
 use crate::model::gain::Gain;
 use crate::samples::LANES;
 use crate::scene::Loss;
-use crate::{Input, Inputs, Shade, SharedDevice, TensorError};
+use crate::{Input, Inputs, Levels, Shade, SharedDevice, TensorError};
 
 /// Images to be matched, and the layers that may move for it.
 pub struct Problem {
@@ -21,6 +21,8 @@ pub struct Problem {
     parts: Vec<Part>,
     /// The layers.
     pub layers: Vec<Layer>,
+    /// What makes the levels that samples look up of the UV atlas, and what it takes; layers' own inputs follow their values.
+    levels: Option<(Levels, Inputs)>,
 }
 
 /// Some of the pixels.
@@ -76,7 +78,11 @@ impl Problem {
         shared: &SharedDevice,
         parts: Vec<(Shade, Inputs)>,
         layers: Vec<Layer>,
+        mut levels: Option<(Levels, Inputs)>,
     ) -> Result<Self, TensorError> {
+        if let Some((_, inputs)) = &mut levels {
+            layers.iter().try_for_each(|layer| layer.show_atlas(layer.value.clone(), inputs))?;
+        }
         let device = shared.device();
         let part = |(index, (shade, mut inputs)): (usize, (Shade, Inputs))| {
             for layer in &layers {
@@ -91,18 +97,41 @@ impl Problem {
                 inputs,
             })
         };
-        Ok(Self { parts: parts.into_iter().enumerate().map(part).collect::<Result<_, _>>()?, layers })
+        let parts = parts.into_iter().enumerate().map(part).collect::<Result<_, _>>()?;
+        let mut problem = Self { parts, layers, levels };
+        problem.make_levels()?;
+        Ok(problem)
     }
 
-    /// Take other constants: the columns of the parameters and, where no layer is the specular cube, that cube.
-    pub fn set_constants(&mut self, columns: &Tensor<1>, lobe: Option<&Tensor<2>>) {
-        let own = self.layers.iter().any(|layer| layer.input == Input::Lobe);
+    /// Make levels anew.
+    fn make_levels(&mut self) -> Result<(), TensorError> {
+        if let Some((levels, inputs)) = &self.levels {
+            let made = levels.make(inputs.clone())?;
+            self.parts.iter_mut().for_each(|part| part.inputs.levels = made.clone());
+        }
+        Ok(())
+    }
+
+    /// Take other constants: the columns of the parameters, and of the cubes that these choose those that no layer is.
+    ///
+    /// # Errors
+    /// When the device does not take it.
+    pub fn set_constants(
+        &mut self,
+        columns: &Tensor<1>,
+        cubes: &[(Input, Tensor<2>)],
+    ) -> Result<(), TensorError> {
+        let chosen =
+            || cubes.iter().filter(|(input, _)| self.layers.iter().all(|layer| layer.input != *input));
         for part in &mut self.parts {
             part.inputs.columns = columns.clone();
-            if let Some(lobe) = lobe.filter(|_| !own) {
-                part.inputs.lobe = lobe.clone();
-            }
+            chosen().for_each(|(input, cube)| *slot(*input, &mut part.inputs) = cube.clone());
         }
+        if let Some((_, inputs)) = &mut self.levels {
+            inputs.columns = columns.clone();
+            chosen().for_each(|(input, cube)| *slot(*input, inputs) = cube.clone());
+        }
+        self.make_levels()
     }
 
     /// Take gains, weights and working targets anew, at the present image.
@@ -220,6 +249,11 @@ impl Problem {
     fn image_loss(&self, index: usize, layer: &Layer, texels: Tensor<2>) -> Result<Tensor<1>, TensorError> {
         let part = &self.parts[index];
         let mut inputs = part.inputs.clone();
+        if let Some((levels, own)) = self.levels.as_ref().filter(|_| layer.in_atlas.is_some()) {
+            let mut own = own.clone();
+            layer.show_atlas(texels.clone(), &mut own)?;
+            inputs.levels = levels.make(own)?;
+        }
         layer.show(index, texels, &mut inputs)?;
         let image = part.shade.image(inputs)?;
         let residual = image * part.gain.clone().autodiff() - part.target.clone().autodiff();
@@ -242,6 +276,12 @@ impl Problem {
     pub fn set(&mut self, index: usize, texels: Tensor<2>) -> Result<(), TensorError> {
         for (part, Part { inputs, .. }) in self.parts.iter_mut().enumerate() {
             self.layers[index].show(part, texels.clone(), inputs)?;
+        }
+        if let Some((_, inputs)) = &mut self.levels {
+            self.layers[index].show_atlas(texels.clone(), inputs)?;
+        }
+        if self.layers[index].in_atlas.is_some() {
+            self.make_levels()?;
         }
         self.layers[index].value = texels;
         Ok(())

@@ -4,15 +4,15 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use super::MapError;
+use super::function::acts_through_cubes;
 use crate::bake::Illumination;
 use crate::engine::view::ObservedView;
 use crate::engine::{Point, Unknown};
-use crate::model::params::Param;
+use crate::levels::atlas_of;
 use crate::prepare::Baked;
-use crate::program::shading::ShadingError;
+use crate::samples::ViewSamples;
 use crate::scene::mesh::PosedMesh;
 use crate::scene::{MapKind, Scene};
-use crate::shader::PlanError;
 
 /// What is to be fitted.
 pub struct MapTask<'a> {
@@ -67,13 +67,12 @@ impl<'a> MapTask<'a> {
         }
     }
 
-    /// That tensors hold what the effects read, and that no constant is free that `held` names.
-    pub(super) fn check(&self, held: impl Fn(Param) -> bool) -> Result<(), MapError> {
-        if self.scene.needs().atlas {
-            return Err(ShadingError::from(PlanError::no_atlas(self.scene.effects)).into());
-        }
+    /// That tensors make what the scene asks for, and that no constant is free which acts through a cube that is fitted.
+    pub(super) fn check(&self) -> Result<(), MapError> {
+        let views: Vec<&ViewSamples> = self.observed.iter().map(|view| &view.samples).collect();
+        atlas_of(self.scene.setup(), &views)?;
         let mut free = self.unknowns.iter().filter_map(Unknown::column).map(|column| column.param);
-        match free.find(|&param| held(param)) {
+        match free.find(|&param| acts_through_cubes(param, &self.kinds)) {
             Some(param) => Err(MapError::Sharpness { param: param.name() }),
             None => Ok(()),
         }

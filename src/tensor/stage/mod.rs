@@ -1,7 +1,7 @@
 //! The shading operation on the device: the passes forwards and backwards; `resident`: what stays there from one to
 //! the next.
 
-mod resident;
+pub(super) mod resident;
 
 use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
@@ -16,8 +16,10 @@ use self::resident::{Constants, Faces, fixed_planes, group_starts};
 use super::buffer::{TensorBuffer, check_shape, lend};
 use super::drawn::Planes;
 use super::inputs::{INPUTS, Input};
+use super::operation::Operation;
 use super::scatter::Scattering;
 use super::shaded::{Scatter, Shaded};
+use super::sum::Sums;
 use super::{SharedDevice, TensorError, pass};
 use crate::adjoint::{Adjoint, Binding, Module};
 use crate::gpu::engine::DeviceSamples;
@@ -44,7 +46,7 @@ pub(super) struct Stage {
     /// By what is wanted.
     backward: Mutex<HashMap<Vec<Input>, Compiled>>,
     scattering: Scattering,
-    sum: ComputePipeline,
+    sums: Sums,
 }
 
 #[derive(Clone, Debug)]
@@ -90,9 +92,6 @@ impl Stage {
                 faces[i] = Some(Faces::new(gpu, cube.size())?);
             }
         }
-        let module = |name: &str, wgsl: &str| -> Result<ComputePipeline, GpuError> {
-            pass::pipeline(gpu, &pass::module(gpu, name, wgsl)?, "cs_main")
-        };
         let stage = Self {
             part: gpu.buffer(
                 "part",
@@ -101,13 +100,13 @@ impl Stage {
             ),
             fixed,
             group_start: gpu.storage("groups", bytemuck::cast_slice(&group_starts(views)))?,
-            constants: Constants::new(gpu, &adjoint, shaded)?,
+            constants: Constants::new(gpu, &adjoint.plan.constants, shaded.params, shaded.columns)?,
             faces,
-            fill_faces: module("faces", include_str!("../faces.wgsl"))?,
+            fill_faces: Faces::filler(gpu)?,
             forward: Compiled::new(gpu, &adjoint.forward())?,
             backward: Mutex::default(),
             scattering: Scattering::new(gpu, scatter)?,
-            sum: module("sum", include_str!("../sum.wgsl"))?,
+            sums: Sums::new(gpu)?,
             shared: shared.clone(),
             adjoint,
             slots,
@@ -117,85 +116,12 @@ impl Stage {
     }
 
     /// The shape of an input's tensor.
-    pub(super) fn shape(&self, input: Input) -> Shape {
-        match (input.width(), CUBES.iter().position(|&cube| cube == input)) {
+    fn shape_of(&self, input: Input) -> Shape {
+        match (self.adjoint.width(input), CUBES.iter().position(|&cube| cube == input)) {
             (Some(width), _) => Shape::new([self.samples, width]),
             (_, Some(i)) => Shape::new([self.faces[i].as_ref().map_or(0, Faces::texels), 4]),
             _ => Shape::new([self.adjoint.columns.len()]),
         }
-    }
-
-    /// The image of those inputs.
-    pub(super) fn forward(&self, inputs: &[CubeTensor; INPUTS]) -> Result<CubeTensor, TensorError> {
-        let (lent, mut made) = self.lend(inputs, None, &[Shape::new([self.slots, 4])])?;
-        let image = made.remove(0);
-        let mut encoder = self.encoder("shade");
-        self.fill(&mut encoder, &lent);
-        let resource = |binding: Binding| match binding {
-            Binding::Image => image.binding(),
-            other => self.resource(other, &lent),
-        };
-        self.dispatch(&mut encoder, &self.forward, &resource);
-        self.submit(encoder)?;
-        Ok(image.into_tensor())
-    }
-
-    /// What each of `wanted` gets of an adjoint of the image, in their order.
-    pub(super) fn backward(
-        &self,
-        inputs: &[CubeTensor; INPUTS],
-        adjoint: CubeTensor,
-        wanted: &[Input],
-    ) -> Result<Vec<CubeTensor>, TensorError> {
-        check_shape("the image's adjoint", &adjoint, &[self.slots, 4])?;
-        let shapes: Vec<Shape> = wanted.iter().map(|&input| self.shape(input)).collect();
-        let (lent, made) = self.lend(inputs, Some(adjoint), &shapes)?;
-        let mut encoder = self.encoder("adjoint of shading");
-        self.fill(&mut encoder, &lent);
-        for part in self.parts(wanted)? {
-            let compiled = self.compiled(&part)?;
-            let mut scratch = HashMap::new();
-            for &binding in &compiled.bindings {
-                let numbers = match binding {
-                    Binding::PartialSums => {
-                        pass::workgroup_count(self.slots as u64) as usize * self.adjoint.columns.len()
-                    }
-                    Binding::LightAdjoint(_) => 4 * self.samples,
-                    Binding::LightPlace(_) => 3 * self.samples,
-                    _ => continue,
-                };
-                scratch.insert(binding, self.room(numbers)?);
-            }
-            let gradient = |input: Input| &made[wanted.iter().position(|&w| w == input).unwrap_or(0)];
-            let resource = |binding: Binding| match binding {
-                Binding::Gradient(input) => gradient(input).binding(),
-                other => {
-                    scratch.get(&other).map_or_else(|| self.resource(other, &lent), Buffer::as_entire_binding)
-                }
-            };
-            self.dispatch(&mut encoder, &compiled, &resource);
-            if part.contains(&Input::Columns) {
-                self.add_up(&mut encoder, &scratch[&Binding::PartialSums], gradient(Input::Columns))?;
-            }
-            for &cube in part.iter().filter(|input| input.faces().is_some()) {
-                let size =
-                    self.faces[at(cube) - at(Input::Irradiance)].as_ref().map_or(0, |faces| faces.size);
-                let lookups = self.adjoint.lookups(cube);
-                let lights: Vec<[&Buffer; 2]> = lookups
-                    .map(|(i, _)| [&scratch[&Binding::LightAdjoint(i)], &scratch[&Binding::LightPlace(i)]])
-                    .collect();
-                self.scattering.encode(
-                    self.shared.gpu(),
-                    &mut encoder,
-                    &lights,
-                    self.samples,
-                    size,
-                    gradient(cube),
-                )?;
-            }
-        }
-        self.submit(encoder)?;
-        Ok(made.into_iter().map(TensorBuffer::into_tensor).collect())
     }
 
     /// The inputs' buffers by their place (the image's adjoint last), and room for results.
@@ -209,7 +135,7 @@ impl Stage {
         let mut places = Vec::new();
         let mut tensors = Vec::new();
         for input in Input::ALL.into_iter().filter(|&input| self.adjoint.reads(input)) {
-            let shape: Vec<usize> = self.shape(input).iter().copied().collect();
+            let shape: Vec<usize> = self.shape_of(input).iter().copied().collect();
             check_shape(input.name(), &inputs[at(input)], &shape)?;
             places.push(at(input));
             tensors.push((input.name(), inputs[at(input)].clone()));
@@ -319,32 +245,98 @@ impl Stage {
         known.insert(wanted.to_vec(), compiled.clone());
         Ok(compiled)
     }
+}
 
-    /// The sums of all workgroups' rows, in a fixed tree.
-    fn add_up(
+impl Operation for Stage {
+    fn shared(&self) -> &SharedDevice {
+        &self.shared
+    }
+
+    fn reads(&self, input: Input) -> bool {
+        self.adjoint.reads(input)
+    }
+
+    fn check(&self, tracked: &[Input]) -> Result<(), TensorError> {
+        Ok(tracked.iter().try_for_each(|&input| self.adjoint.moves(input))?)
+    }
+
+    fn shape(&self, input: Input) -> Shape {
+        self.shape_of(input)
+    }
+
+    /// The image of those inputs.
+    fn forward(&self, inputs: &[CubeTensor; INPUTS]) -> Result<CubeTensor, TensorError> {
+        let (lent, mut made) = self.lend(inputs, None, &[Shape::new([self.slots, 4])])?;
+        let image = made.remove(0);
+        let mut encoder = self.encoder("shade");
+        self.fill(&mut encoder, &lent);
+        let resource = |binding: Binding| match binding {
+            Binding::Image => image.binding(),
+            other => self.resource(other, &lent),
+        };
+        self.dispatch(&mut encoder, &self.forward, &resource);
+        self.submit(encoder)?;
+        Ok(image.into_tensor())
+    }
+
+    fn backward(
         &self,
-        encoder: &mut CommandEncoder,
-        partial: &Buffer,
-        result: &TensorBuffer,
-    ) -> Result<(), GpuError> {
-        let gpu = self.shared.gpu();
-        let columns = self.adjoint.columns.len();
-        let mut rows = pass::workgroup_count(self.slots as u64) as usize;
-        let mut given = partial.clone();
-        loop {
-            let left = rows.div_ceil(64);
-            let sums = self.room(left * columns)?;
-            let size = [rows as u32, columns as u32];
-            let size = gpu.buffer("size", bytemuck::cast_slice(&size), BufferUsages::UNIFORM);
-            let last = left == 1;
-            let output = if last { result.binding() } else { sums.as_entire_binding() };
-            let resources = vec![(0, size.as_entire_binding()), (1, given.as_entire_binding()), (2, output)];
-            pass::dispatch(gpu, encoder, &self.sum, &[resources], (64 * left * columns) as u64);
-            if last {
-                return Ok(());
+        inputs: &[CubeTensor; INPUTS],
+        adjoint: CubeTensor,
+        wanted: &[Input],
+    ) -> Result<Vec<CubeTensor>, TensorError> {
+        check_shape("the image's adjoint", &adjoint, &[self.slots, 4])?;
+        let shapes: Vec<Shape> = wanted.iter().map(|&input| self.shape_of(input)).collect();
+        let (lent, made) = self.lend(inputs, Some(adjoint), &shapes)?;
+        let mut encoder = self.encoder("adjoint of shading");
+        self.fill(&mut encoder, &lent);
+        for part in self.parts(wanted)? {
+            let compiled = self.compiled(&part)?;
+            let mut scratch = HashMap::new();
+            for &binding in &compiled.bindings {
+                let numbers = match binding {
+                    Binding::PartialSums => {
+                        pass::workgroup_count(self.slots as u64) as usize * self.adjoint.columns.len()
+                    }
+                    Binding::LightAdjoint(_) => 4 * self.samples,
+                    Binding::LightPlace(_) => 3 * self.samples,
+                    _ => continue,
+                };
+                scratch.insert(binding, self.room(numbers)?);
             }
-            (rows, given) = (left, sums);
+            let gradient = |input: Input| &made[wanted.iter().position(|&w| w == input).unwrap_or(0)];
+            let resource = |binding: Binding| match binding {
+                Binding::Gradient(input) => gradient(input).binding(),
+                other => {
+                    scratch.get(&other).map_or_else(|| self.resource(other, &lent), Buffer::as_entire_binding)
+                }
+            };
+            self.dispatch(&mut encoder, &compiled, &resource);
+            if part.contains(&Input::Columns) {
+                let rows = pass::workgroup_count(self.slots as u64) as usize;
+                let partial = &scratch[&Binding::PartialSums];
+                let (gpu, columns) = (self.shared.gpu(), self.adjoint.columns.len());
+                self.sums.add_up(gpu, &mut encoder, partial, (rows, columns), gradient(Input::Columns))?;
+            }
+            for &cube in part.iter().filter(|input| input.faces().is_some()) {
+                let size =
+                    self.faces[at(cube) - at(Input::Irradiance)].as_ref().map_or(0, |faces| faces.size);
+                let lookups = self.adjoint.lookups(cube);
+                let lights: Vec<[&Buffer; 2]> = lookups
+                    .map(|(i, _)| [&scratch[&Binding::LightAdjoint(i)], &scratch[&Binding::LightPlace(i)]])
+                    .collect();
+                self.scattering.encode(
+                    self.shared.gpu(),
+                    &mut encoder,
+                    &lights,
+                    self.samples,
+                    size,
+                    gradient(cube),
+                )?;
+            }
         }
+        self.submit(encoder)?;
+        Ok(made.into_iter().map(TensorBuffer::into_tensor).collect())
     }
 }
 

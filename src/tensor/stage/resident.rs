@@ -5,44 +5,50 @@ use wgpu::{
     TextureDimension, TextureFormat, TextureUsages, TextureView, TextureViewDescriptor, TextureViewDimension,
 };
 
-use crate::adjoint::Adjoint;
+use crate::adjoint::{Adjoint, module_of};
 use crate::buffer::TensorBuffer;
 use crate::gpu::{Gpu, GpuError};
-use crate::model::params::Param;
+use crate::model::params::{Column, Param, Params};
 use crate::pass;
 use crate::samples::ViewSamples;
 use crate::samples::surface_records::neutral;
-use crate::shaded::Shaded;
+use crate::shader::quantity::Constant;
 
 /// The block of constants, and the pass that fills it.
 #[derive(Debug)]
-pub(super) struct Constants {
+pub(crate) struct Constants {
     pipeline: ComputePipeline,
     values: Buffer,
     filled: Buffer,
-    pub(super) block: Buffer,
+    pub(crate) block: Buffer,
 }
 
 /// A cube that shaders read.
 #[derive(Clone, Debug)]
-pub(super) struct Faces {
-    pub(super) size: usize,
-    pub(super) view: TextureView,
+pub(crate) struct Faces {
+    pub(crate) size: usize,
+    pub(crate) view: TextureView,
     /// Of the same texels, to be written.
     storage: TextureView,
 }
 
 impl Constants {
-    pub(super) fn new(gpu: &Gpu, adjoint: &Adjoint, shaded: &Shaded<'_>) -> Result<Option<Self>, GpuError> {
-        if adjoint.plan.constants.is_empty() {
+    /// Of a plan's constants; `None` where it has none.
+    pub(crate) fn new(
+        gpu: &Gpu,
+        constants: &[Constant],
+        params: &Params,
+        columns: &[Column],
+    ) -> Result<Option<Self>, GpuError> {
+        if constants.is_empty() {
             return Ok(None);
         }
-        let module = pass::module(gpu, "constants", &adjoint.constants())?;
+        let module = pass::module(gpu, "constants", &module_of(constants, columns))?;
         let values: Vec<f32> = Param::all()
-            .flat_map(|param| shaded.params.rgb(param).into_iter().chain([0.0]))
+            .flat_map(|param| params.rgb(param).into_iter().chain([0.0]))
             .map(|value| value as f32)
             .collect();
-        let bytes = 16 * adjoint.plan.constants.len();
+        let bytes = 16 * constants.len();
         let block = |usage| gpu.buffer("constants", &vec![0; bytes], usage);
         Ok(Some(Self {
             pipeline: pass::pipeline(gpu, &module, "cs_main")?,
@@ -53,7 +59,7 @@ impl Constants {
     }
 
     /// Take the free columns from their tensor, and all else from the parameters, to the block.
-    pub(super) fn fill(&self, gpu: &Gpu, encoder: &mut CommandEncoder, columns: Option<&TensorBuffer>) {
+    pub(crate) fn fill(&self, gpu: &Gpu, encoder: &mut CommandEncoder, columns: Option<&TensorBuffer>) {
         let mut resources = vec![(1, self.values.as_entire_binding()), (2, self.filled.as_entire_binding())];
         resources.extend(columns.map(|columns| (0, columns.binding())));
         pass::dispatch(gpu, encoder, &self.pipeline, &[resources], 1);
@@ -62,7 +68,7 @@ impl Constants {
 }
 
 impl Faces {
-    pub(super) fn new(gpu: &Gpu, size: usize) -> Result<Self, GpuError> {
+    pub(crate) fn new(gpu: &Gpu, size: usize) -> Result<Self, GpuError> {
         let side = size as u32 + 2;
         let texture = gpu.device.create_texture(&TextureDescriptor {
             label: Some("faces"),
@@ -89,8 +95,13 @@ impl Faces {
         })
     }
 
+    /// The pass that [`fill`](Self::fill) encodes.
+    pub(crate) fn filler(gpu: &Gpu) -> Result<ComputePipeline, GpuError> {
+        pass::pipeline(gpu, &pass::module(gpu, "faces", include_str!("../faces.wgsl"))?, "cs_main")
+    }
+
     /// Take the texels from their tensor to where shaders read them.
-    pub(super) fn fill(
+    pub(crate) fn fill(
         &self,
         gpu: &Gpu,
         encoder: &mut CommandEncoder,
@@ -101,14 +112,14 @@ impl Faces {
         pass::dispatch(gpu, encoder, pipeline, &[resources], self.texels() as u64);
     }
 
-    pub(super) fn texels(&self) -> usize {
+    pub(crate) fn texels(&self) -> usize {
         6 * (self.size + 2) * (self.size + 2)
     }
 }
 
 /// What is no tensor of each sample, plane by plane; the share last. What records lack is neutral, but for the normal, which
 /// is then their base.
-pub(super) fn fixed_planes(adjoint: &Adjoint, views: &[&ViewSamples]) -> Vec<f32> {
+pub(crate) fn fixed_planes(adjoint: &Adjoint, views: &[&ViewSamples]) -> Vec<f32> {
     let mut numbers = Vec::new();
     for (name, width) in adjoint.fixed() {
         for c in 0..width {
@@ -131,7 +142,7 @@ pub(super) fn fixed_planes(adjoint: &Adjoint, views: &[&ViewSamples]) -> Vec<f32
 }
 
 /// Where each group's records start, the views one after the other.
-pub(super) fn group_starts(views: &[&ViewSamples]) -> Vec<u32> {
+pub(crate) fn group_starts(views: &[&ViewSamples]) -> Vec<u32> {
     let mut starts = vec![0];
     for view in views {
         let base = starts.last().copied().unwrap_or(0);

@@ -148,18 +148,19 @@ pub(super) fn compare(vectors: &Vectors) {
     }
     #[cfg(feature = "burn")]
     if let Some(shared) = crate::tensors::bench::shared() {
-        let found = tensors::found(shared, &own, &columns);
-        check(&own, (&PLAIN_SET, &lacking), "burn", near.times(4.0), &found);
-        tensors::refuse_texels(shared, &own);
+        for set in [&PLAIN_SET, &DIFFUSION] {
+            let found = tensors::found(shared, &own, set, &columns);
+            check(&own, (set, &lacking), "burn", near.times(4.0), &found);
+        }
     }
 }
 
 #[cfg(feature = "burn")]
 mod tensors {
     use burn::tensor::{Tensor, TensorData};
+    use skinfit::bake::stacks::Stack;
     use skinfit::samples::LANES;
-    use skinfit::tensor::adjoint::is_sharpness;
-    use skinfit::tensor::{Inputs, Scatter, Shade, Shaded, SharedDevice, TensorError};
+    use skinfit::tensor::{Inputs, Scatter, Shade, Shaded, SharedDevice};
 
     use super::*;
 
@@ -173,18 +174,18 @@ mod tensors {
         own: &Composed<'_>,
         set: &Set,
         columns: &[Column],
-    ) -> Result<(Shade, Inputs), TensorError> {
+    ) -> (Shade, Inputs) {
         let setup = own.setup(set.choices, set.added);
         let samples = own.samples(setup);
         let illumination = own.illumination();
         let shaded = Shaded { setup, params: &own.params, columns, illumination: &illumination };
-        Shade::new(shared, &shaded, &[&samples], Scatter::Exact)
+        Shade::new(shared, &shaded, &[&samples], Scatter::Exact).unwrap()
     }
 
-    /// Each channel of a colour is a column, and moves no other channel. What acts through cubes cannot be one.
-    pub(super) fn found(shared: &SharedDevice, own: &Composed<'_>, params: &[Param]) -> Found {
-        let setup = own.setup(PLAIN_SET.choices, PLAIN_SET.added);
-        let free = |param: &Param| param.asked_for(setup.effects) && !is_sharpness(*param);
+    /// Each channel of a colour is a column, and moves no other channel. What acts through a cube alone cannot be one.
+    pub(super) fn found(shared: &SharedDevice, own: &Composed<'_>, set: &Set, params: &[Param]) -> Found {
+        let setup = own.setup(set.choices, set.added);
+        let free = |param: &Param| param.asked_for(setup.effects) && *param != Param::SpecularLobe;
         let of = |(k, &param): (usize, &Param)| {
             let columns = match param.info().rgb {
                 true => Column::per_channel(param).to_vec(),
@@ -195,13 +196,13 @@ mod tensors {
         let columns: Vec<(usize, usize, Column)> =
             params.iter().enumerate().filter(|(_, param)| free(param)).flat_map(of).collect();
         let held: Vec<Column> = columns.iter().map(|(.., column)| *column).collect();
-        let (shade, inputs) = operation(shared, own, &PLAIN_SET, &held).unwrap();
+        let (shade, inputs) = operation(shared, own, set, &held);
         let image = numbers(shade.image(inputs.clone()).unwrap());
         let image = image.as_chunks::<4>().0[..own.count()].to_vec();
         let mut jacobian = vec![vec![None; params.len()]; own.count()];
         for pixel in 0..own.count() {
             for c in 0..4 {
-                let slopes = row(shared, &shade, &inputs, 4 * pixel + c);
+                let slopes = row((shared, own), (&shade, &inputs), &held, 4 * pixel + c);
                 for ((k, channel, column), slope) in columns.iter().zip(slopes) {
                     let row: &mut [f64; 4] = jacobian[pixel][*k].get_or_insert([0.0; 4]);
                     if column.param.info().rgb && c < 3 && *channel != c {
@@ -220,20 +221,37 @@ mod tensors {
         Found { image, jacobian }
     }
 
-    /// How one number of the image moves with each column.
-    fn row(shared: &SharedDevice, shade: &Shade, inputs: &Inputs, at: usize) -> Vec<f64> {
+    /// How one number of the image moves with each column: by itself, and by the cubes that it chooses.
+    fn row(
+        (shared, own): (&SharedDevice, &Composed<'_>),
+        (shade, inputs): (&Shade, &Inputs),
+        held: &[Column],
+        at: usize,
+    ) -> Vec<f64> {
         let mut weights = vec![0.0_f32; 4 * LANES];
         weights[at] = 1.0;
         let weights = Tensor::<2>::from_data(TensorData::new(weights, [LANES, 4]), shared.device());
         let free = inputs.columns.clone().autodiff().require_grad();
-        let image = shade.image(Inputs { columns: free.clone(), ..inputs.clone() }).unwrap();
-        let gradients = (image * weights.autodiff()).sum().backward();
-        numbers(free.grad(&gradients).unwrap())
-    }
-
-    /// Tensors have no texels, and say so.
-    pub(super) fn refuse_texels(shared: &SharedDevice, own: &Composed<'_>) {
-        let error = operation(shared, own, &DIFFUSION, &[]).unwrap_err().to_string();
-        assert!(error.contains("the effect diffusion is computed in texels"), "{error}");
+        let [reflected, glossy] =
+            [&inputs.reflected, &inputs.glossy].map(|cube| cube.clone().autodiff().require_grad());
+        let (of_black, of_white) = (reflected.clone(), glossy.clone());
+        let mut tracked = Inputs { columns: free.clone(), reflected, glossy, ..inputs.clone() };
+        if let Some((levels, start)) = shade.levels() {
+            tracked.levels = levels.make(Inputs { columns: free.clone(), ..start.clone() }).unwrap();
+        }
+        let gradients = (shade.image(tracked).unwrap() * weights.autodiff()).sum().backward();
+        let mut slopes = numbers(free.grad(&gradients).unwrap());
+        let illumination = own.illumination();
+        for (stack, cube) in [(Stack::Reflected, of_black), (Stack::Glossy, of_white)] {
+            let moved = stack.at(&illumination, stack.place(&own.params));
+            let (Some((_, slope)), Some(gained)) = (moved, cube.grad(&gradients)) else { continue };
+            let pairs = numbers(gained).into_iter().zip(slope.padded().as_flattened());
+            let by_place: f64 = pairs.map(|(gained, &slope)| gained * f64::from(slope)).sum();
+            for (name, pace) in stack.paces(&own.params) {
+                let columns = held.iter().zip(&mut slopes).filter(|(column, _)| column.param.name() == name);
+                columns.for_each(|(_, slope)| *slope += pace * by_place);
+            }
+        }
+        slopes
     }
 }

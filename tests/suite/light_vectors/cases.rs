@@ -1,6 +1,7 @@
 //! Cases of a file as stored samples: a pixel each, of one sample, with parameters of its own.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use skinfit::bake::Illumination;
 use skinfit::bake::reflected::ReflectedStack;
@@ -9,7 +10,7 @@ use skinfit::model::cube::{Channel, Cube};
 use skinfit::model::evaluate::Setup;
 use skinfit::model::params::{Param, Params};
 use skinfit::samples::surface_records::{Asked, NEUTRAL, Unmade, neutral};
-use skinfit::samples::{LANES, SurfaceRecords, ViewSamples};
+use skinfit::samples::{Atlas, LANES, SurfaceRecords, ViewSamples};
 
 /// Cases that one plan of rules shades.
 pub(super) struct Cases {
@@ -20,6 +21,8 @@ pub(super) struct Cases {
     /// Whether slopes are wanted.
     pub(super) slopes: bool,
     pub(super) each: Vec<Case>,
+    /// Where samples look up what is computed in texels.
+    pub(super) atlas: Option<Arc<Atlas>>,
 }
 
 /// Light that is the same from everywhere.
@@ -101,7 +104,8 @@ impl Cases {
         let cases = &self.each[which];
         let groups = cases.len().div_ceil(LANES);
         let slots = groups * LANES;
-        let asked = Asked { fields: self.setup.needs().fields, ..Asked::EVERYTHING };
+        let (fields, uv) = (self.setup.needs().fields, self.atlas.is_some());
+        let asked = Asked { fields, uv, ..Asked::EVERYTHING };
         let mut surface = SurfaceRecords::new(asked, groups);
         for slot in 0..slots {
             let share = if slot < cases.len() { 1.0 } else { 0.0 };
@@ -120,6 +124,7 @@ impl Cases {
             pixel: (0..slots as u32).collect(),
             coverage: vec![1.0; slots],
             surface,
+            atlas: self.atlas.clone(),
             ..ViewSamples::default()
         }
     }

@@ -106,7 +106,18 @@ impl Told<'_> {
 
 /// Each case on each evaluator of the file's row.
 pub(super) fn compare(file: &Node<'_>, cases: &Cases, check: impl Fn(&Told<'_>)) {
-    for on in table::evaluators(&file.vector.name) {
+    compare_on(table::evaluators(&file.vector.name), file, cases, check);
+}
+
+/// Each case on each engine of the file's row, and on tensors.
+pub(super) fn compare_on_engines(file: &Node<'_>, cases: &Cases, check: impl Fn(&Told<'_>)) {
+    let mut evaluators = table::evaluators(&file.vector.name);
+    evaluators.retain(|on| !matches!(on, On::Rules(_)));
+    compare_on(evaluators, file, cases, check);
+}
+
+fn compare_on(evaluators: Vec<On>, file: &Node<'_>, cases: &Cases, check: impl Fn(&Told<'_>)) {
+    for on in evaluators {
         let all = on.shown(cases);
         // Tensors hold what is no column, at the value of most cases.
         let count = all.iter().flatten().count();

@@ -91,6 +91,7 @@ fn samples_are_lit_as_the_vectors_say_and_move_as_they_do_on_every_evaluator() {
         columns: vec![own(BEAM, "color"), own(POINT, "color"), azimuth, elevation],
         slopes: true,
         each: inputs.iter().enumerate().filter_map(case).collect(),
+        atlas: None,
     };
     assert_eq!(inputs.len() - cases.each.len(), 2);
     compare(&file, &cases, |told| {

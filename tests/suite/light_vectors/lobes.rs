@@ -65,6 +65,7 @@ fn samples_mirror_lights_as_the_vectors_say_and_move_as_they_do_on_every_evaluat
             columns: moved.map(param).to_vec(),
             slopes: true,
             each: inputs.iter().enumerate().map(lit).collect(),
+            atlas: None,
         };
         compare(&file, &cases, |told| {
             let want = &expected[told.at];
@@ -125,6 +126,7 @@ fn samples_mirror_a_white_environment_as_the_vectors_say_on_every_evaluator() {
             columns: ["roughness", "f0"].map(param).to_vec(),
             slopes: false,
             each,
+            atlas: None,
         };
         let near = Tolerance { abs: stated, rel: 0.0 };
         let expected = file.at("expected").at(values);

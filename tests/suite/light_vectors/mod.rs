@@ -4,7 +4,7 @@
 //! - `table`: which files are compared on what: these tests' evaluators, and the table of the vectors' own page
 //! - `cases`: cases of a file as stored samples, a pixel each; `evaluators`: all that make images of them
 //! - `rules`, `engines`, `tensors`: how each does
-//! - `lamps`, `lobes`, `sky`, `through`: the files
+//! - `lamps`, `lobes`, `scattered`, `sky`, `through`: the files
 
 mod cases;
 mod engines;
@@ -12,6 +12,7 @@ mod evaluators;
 mod lamps;
 mod lobes;
 mod rules;
+mod scattered;
 mod sky;
 mod table;
 #[cfg(feature = "burn")]
@@ -21,6 +22,6 @@ mod through;
 use crate::common::vectors_light;
 use crate::vectors::reader::Vectors;
 
-fn read() -> Vectors {
+pub(crate) fn read() -> Vectors {
     Vectors::read(&vectors_light())
 }

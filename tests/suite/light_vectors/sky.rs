@@ -60,6 +60,7 @@ fn samples_show_the_share_of_the_sky_that_the_vectors_say_and_how_it_turns_on_ev
         columns: vec![Param::EnvironmentRotation],
         slopes: true,
         each: inputs.iter().enumerate().map(case).collect(),
+        atlas: None,
     };
     compare(&file, &cases, |told| {
         let want = &expected[told.at];
@@ -95,6 +96,7 @@ fn samples_throw_light_back_as_the_vectors_say_on_every_evaluator() {
         columns: vec![Param::Occlusion],
         slopes: true,
         each: each.collect(),
+        atlas: None,
     };
     let expected = file.at("expected");
     let entry = |key: &str, at: usize, c: usize| {

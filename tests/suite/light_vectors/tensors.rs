@@ -3,16 +3,14 @@
 use burn::tensor::{Tensor, TensorData};
 use skinfit::model::params::{Column, Param, Params};
 use skinfit::samples::LANES;
-use skinfit::tensor::adjoint::is_sharpness;
 use skinfit::tensor::{Inputs, Scatter, Shade, Shaded, SharedDevice};
 
 use super::cases::{Case, Cases, Shown};
 
 /// What they make of each case. What is no column is as in most cases; the others are not made.
 pub(super) fn shown(shared: &SharedDevice, cases: &Cases) -> Vec<Option<Shown>> {
-    let held: Vec<Param> = Param::of(cases.setup.effects)
-        .filter(|param| !cases.columns.contains(param) || is_sharpness(*param))
-        .collect();
+    let held: Vec<Param> =
+        Param::of(cases.setup.effects).filter(|param| !cases.columns.contains(param)).collect();
     let alike = |a: &Case, b: &Case| held.iter().all(|&param| a.params.rgb(param) == b.params.rgb(param));
     let how_many = |case: &&Case| cases.each.iter().filter(|other| alike(case, other)).count();
     let most = cases.each.iter().max_by_key(how_many).unwrap();
@@ -44,8 +42,7 @@ impl<'s> Operation<'s> {
                 .collect(),
             false => vec![(k, None, Column::tied(param))],
         };
-        let movable = cases.columns.iter().enumerate().filter(|(_, param)| !is_sharpness(**param));
-        let columns: Vec<_> = movable.flat_map(of).collect();
+        let columns: Vec<_> = cases.columns.iter().enumerate().flat_map(of).collect();
         let held: Vec<Column> = columns.iter().map(|(.., column)| *column).collect();
         let shaded = Shaded {
             setup: cases.setup,
@@ -66,7 +63,7 @@ impl<'s> Operation<'s> {
             self.columns.iter().map(|(.., column)| column.get(&cases.each[i].params) as f32).collect();
         let values =
             Tensor::<1>::from_data(TensorData::new(values, [self.columns.len()]), self.shared.device());
-        let image = self.shade.image(Inputs { columns: values.clone(), ..self.inputs.clone() }).unwrap();
+        let image = self.image(&values);
         let rgb = numbers(image)[4 * slot..][..3].try_into().unwrap();
         let mut slopes = Vec::new();
         if cases.slopes {
@@ -84,6 +81,15 @@ impl<'s> Operation<'s> {
         Shown { rgb, slopes }
     }
 
+    /// The image of all cases at those columns; cubes are the same at all of them.
+    fn image(&self, columns: &Tensor<1>) -> Tensor<2> {
+        let mut inputs = Inputs { columns: columns.clone(), ..self.inputs.clone() };
+        if let Some((levels, start)) = self.shade.levels() {
+            inputs.levels = levels.make(Inputs { columns: columns.clone(), ..start.clone() }).unwrap();
+        }
+        self.shade.image(inputs).unwrap()
+    }
+
     /// How one number of the image moves with each column.
     fn row(&self, values: &Tensor<1>, at: usize) -> Vec<f64> {
         let mut weights = vec![0.0_f32; 4 * self.shade.slots()];
@@ -91,7 +97,7 @@ impl<'s> Operation<'s> {
         let weights = TensorData::new(weights, [self.shade.slots(), 4]);
         let weights = Tensor::<2>::from_data(weights, self.shared.device());
         let free = values.clone().autodiff().require_grad();
-        let image = self.shade.image(Inputs { columns: free.clone(), ..self.inputs.clone() }).unwrap();
+        let image = self.image(&free);
         let gradients = (image * weights.autodiff()).sum().backward();
         numbers(free.grad(&gradients).unwrap())
     }

@@ -75,6 +75,7 @@ fn light_comes_through_samples_as_the_vectors_say_and_moves_as_it_does_on_every_
         columns: moved.map(param).to_vec(),
         slopes: true,
         each: inputs.iter().enumerate().map(case).collect(),
+        atlas: None,
     };
     compare(&file, &cases, |told| {
         let want = &expected[told.at];

@@ -203,6 +203,7 @@ impl Case {
             // No effect here reads them.
             reflected: matrix(&[0.0], 1, &device),
             glossy: matrix(&[0.0], 1, &device),
+            levels: matrix(&[0.0], 1, &device),
         };
         let image = shade.image(inputs).unwrap();
         let gradients = (image * matrix(weights, 4, &device)).sum().backward();

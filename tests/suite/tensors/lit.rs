@@ -1,22 +1,23 @@
 //! Lights with their shadows, Fresnel, the sky that a point sees and light through thin parts on tensors: image and gradient
-//! beside the processor's engine, over the same samples; and what of the lobe's sharpness tensors cannot move, told.
+//! beside the processor's engine, over the same samples; what chooses cubes, likewise; and what tensors cannot move, told.
 
 use burn::tensor::{Tensor, TensorData};
 use skinfit::engine::cpu::CpuEngine;
 use skinfit::engine::residual::Residuals;
 use skinfit::engine::view::ObservedView;
-use skinfit::engine::{Objective, Task, Unknown};
-use skinfit::maps::{MapError, MapTask, fit_maps};
+use skinfit::engine::{Objective, Point, Task, Unknown};
+use skinfit::maps::{MapError, MapFunction, MapTask, fit_maps};
 use skinfit::model::choices::{SpecularMap, SpecularModel, SpecularVisibility, SplitSum};
 use skinfit::model::effects::Effect;
 use skinfit::model::params::{Column, Param};
 use skinfit::prepare::Observed;
 use skinfit::samples::ViewSamples;
-use skinfit::scene::MapKind;
+use skinfit::scene::{MapKind, MapPrior};
 use skinfit::shader::term::register;
 use skinfit::tensor::{Input, Inputs, Scatter, Shade, Shaded, SharedDevice};
 
 use super::bench::{numbers, shared};
+use super::maps::small_with;
 use crate::added_term::term;
 use crate::lit::param;
 use crate::sky::{brighter, effect, head_changed, on_cpu};
@@ -77,11 +78,10 @@ fn columns(model: SpecularModel) -> Vec<Column> {
     each.chain(one.into_iter().map(|name| Column::tied(param(name)))).collect()
 }
 
-fn operation(shared: &SharedDevice, observed: &Observed, columns: &[Column]) -> (Shade, Inputs) {
-    let task = observed.task();
+fn operation(shared: &SharedDevice, task: &Task, point: &Point, columns: &[Column]) -> (Shade, Inputs) {
     let views: Vec<&ViewSamples> = task.views.iter().map(|view| &view.samples).collect();
-    let params = observed.start().params;
-    let shaded = Shaded { setup: task.setup, params: &params, columns, illumination: &task.illumination };
+    let params = &point.params;
+    let shaded = Shaded { setup: task.setup, params, columns, illumination: &task.illumination };
     Shade::new(shared, &shaded, &views, Scatter::Exact).unwrap()
 }
 
@@ -103,14 +103,19 @@ fn loss(view: &ObservedView, task: &Task, image: &[f32]) -> (f64, Vec<f32>) {
 }
 
 /// Image and gradient on tensors beside those of the processor's engine.
-fn agree(shared: &SharedDevice, observed: &Observed, columns: &[Column], what: &str) {
+pub(super) fn agree(shared: &SharedDevice, observed: &Observed, columns: &[Column], what: &str) {
+    agree_at(shared, (observed.task(), &observed.start()), columns, what);
+}
+
+/// The same of a task at a point.
+pub(crate) fn agree_at(shared: &SharedDevice, (task, point): (Task, &Point), columns: &[Column], what: &str) {
     let unknowns = columns.iter().copied().map(Unknown::Param).collect();
-    let task = Task { unknowns, ..observed.task() };
-    let (view, point) = (task.views[0].clone(), observed.start());
+    let task = Task { unknowns, ..task };
+    let view = task.views[0].clone();
     let engine = CpuEngine::new(task.clone()).unwrap();
-    let (shade, inputs) = operation(shared, observed, columns);
+    let (shade, inputs) = operation(shared, &task, point, columns);
     let image = numbers(shade.image(inputs.clone()).unwrap());
-    let planes = engine.image(0, &point);
+    let planes = engine.image(0, point);
     let brightest = planes.iter().flatten().fold(0.0_f32, |most, x| most.max(*x));
     let mut compared = 0;
     for slot in (0..image.len() / 4).filter(|&slot| view.pixel_weight(slot) > 0.0) {
@@ -122,14 +127,17 @@ fn agree(shared: &SharedDevice, observed: &Observed, columns: &[Column], what: &
         }
     }
     assert!(compared > 300, "{compared}");
-    let (want_loss, want) = engine.gradient(&point);
+    let (want_loss, want) = engine.gradient(point);
     let (got_loss, slopes) = loss(&view, &task, &image);
     // Sums over a thousand residuals of such an image.
     assert!((got_loss - want_loss).abs() <= 1e-5 * want_loss, "{what}: {got_loss} {want_loss}");
     let shape = [shade.slots(), 4];
     let slopes = Tensor::<2>::from_data(TensorData::new(slopes, shape), shared.device());
     let free = inputs.columns.clone().autodiff().require_grad();
-    let tracked = Inputs { columns: free.clone(), ..inputs };
+    let mut tracked = Inputs { columns: free.clone(), ..inputs };
+    if let Some((levels, start)) = shade.levels() {
+        tracked.levels = levels.make(Inputs { columns: free.clone(), ..start.clone() }).unwrap();
+    }
     let gradients = (shade.image(tracked).unwrap() * slopes.autodiff()).sum().backward();
     let got = numbers(free.grad(&gradients).unwrap());
     let most = want.iter().fold(0.0_f64, |most, slope| most.max(slope.abs()));
@@ -178,7 +186,7 @@ fn a_term_that_only_these_tests_know_moves_tensors_as_it_moves_the_processors_en
 fn every_cube_that_a_lit_scene_looks_up_gets_the_slope_that_differences_show() {
     let Some(shared) = shared() else { return };
     let observed = head(SpecularModel::Kelemen);
-    let (shade, inputs) = operation(shared, &observed, &[]);
+    let (shade, inputs) = operation(shared, &observed.task(), &observed.start(), &[]);
     let image = numbers(shade.image(inputs.clone()).unwrap());
     // Any weights that do not repeat with the pixels.
     let weights: Vec<f32> = (0..image.len()).map(|i| ((7 * i % 23) as f32 - 9.0) / 11.0).collect();
@@ -261,7 +269,7 @@ fn a_cube_that_a_rule_looks_up_at_a_place_of_its_own_is_refused_where_it_is_trac
     let observed =
         baked.with_scene(|scene| scene.views[0].target = Some(target)).sample().unwrap().observe().unwrap();
     agree(shared, &observed, &columns, "a cube looked up by direction");
-    let (shade, inputs) = operation(shared, &observed, &[]);
+    let (shade, inputs) = operation(shared, &observed.task(), &observed.start(), &[]);
     let irradiance = inputs.irradiance.clone().autodiff().require_grad();
     let error = shade.image(Inputs { irradiance, ..inputs }).unwrap_err().to_string();
     assert!(
@@ -270,32 +278,83 @@ fn a_cube_that_a_rule_looks_up_at_a_place_of_its_own_is_refused_where_it_is_trac
     );
 }
 
+/// E_s, and E_r where the specular map is black and where it is white, are other cubes wherever these constants are.
 #[test]
-fn a_lobes_roughness_is_held_by_tensors_and_beside_maps_and_that_is_told() {
+fn constants_that_choose_cubes_move_functions_of_maps_as_they_move_the_processors_engine() {
     let Some(shared) = shared() else { return };
-    let observed = head(SpecularModel::Kelemen);
+    for model in SpecularModel::ALL {
+        let names = ["roughness", "gloss", "specular_lobe", "base_weight"];
+        let free: Vec<Column> = names.map(|name| Column::tied(param(name))).to_vec();
+        let baked = small_with(1, true, |scene| {
+            let camera = &mut scene.views[0].camera;
+            (camera.width, camera.height) = (32, 32);
+            scene.effects = scene.effects.with(effect("fresnel"));
+            scene.choices.specular_model = model;
+            scene.params.set(param("gloss"), 0.4);
+            scene.fit.free.clone_from(&free);
+            scene.fit.maps.rounds = 2;
+            scene.fit.maps.steps = 2;
+            let prior = scene.fit.maps.prior(MapKind::Color);
+            let none = MapPrior { smoothness: 0.0, closeness: 0.0, ..prior };
+            scene.fit.maps.set_prior(MapKind::Color, none);
+        });
+        let target = brighter(on_cpu(&baked));
+        let baked = baked.with_scene(|scene| scene.views[0].target = Some(target));
+        let observed = baked.sample().unwrap().observe().unwrap();
+        let (task, point) = (observed.task(), observed.start());
+        let posed = observed.scene.mesh.pose();
+        let maps = MapTask::new(&observed, &posed, task.views.to_vec(), vec![MapKind::Color]);
+        let function = MapFunction::new(shared, maps).unwrap();
+        let (got_loss, got) = function.loss_and_gradient(&point, vec![None]).unwrap();
+        let (want_loss, want) = CpuEngine::new(task).unwrap().gradient(&point);
+        assert!((got_loss - want_loss).abs() <= 1e-5 * want_loss, "{got_loss} {want_loss}");
+        for ((name, got), want) in names.iter().zip(&got.constants).zip(want) {
+            // As in `agree`.
+            assert!(
+                (got - want).abs() <= 1e-3 * want.abs() && want != 0.0,
+                "{model:?}: {name}: {got} {want}"
+            );
+        }
+        // A fit of maps takes these constants with it, from a place that the target is not of.
+        let away = |point: &Point| {
+            let mut params = point.params.clone();
+            params.set(param("roughness"), 0.45);
+            Point { params, ..point.clone() }
+        };
+        let maps = MapTask::new(&observed, &posed, observed.task().views.to_vec(), vec![MapKind::Color]);
+        let start = away(&maps.start);
+        let fitted = fit_maps(shared, MapTask { start, ..maps }, &mut |_| {}).unwrap();
+        // Cubes and constants are the same for maps and for constants: each step begins where the last one ended.
+        for pair in fitted.history.windows(2) {
+            let (last, next) = (pair[0].after, pair[1].before);
+            assert!((next - last).abs() <= 1e-3 * last, "{model:?}: {:?}", fitted.history);
+        }
+        let moved = fitted.constants.params.scalar(param("roughness")) - 0.45;
+        assert!(moved.abs() > 1e-3 && fitted.history.len() > 2, "{moved} {:?}", fitted.history);
+    }
+}
+
+#[test]
+fn a_constant_that_acts_through_a_fitted_cube_or_a_cube_alone_is_refused_by_name() {
+    let Some(shared) = shared() else { return };
+    let lobe = Column::tied(Param::SpecularLobe);
+    let baked = head_changed(&[Effect::SideSpecular], |scene| {
+        let camera = &mut scene.views[0].camera;
+        (camera.width, camera.height) = (20, 20);
+        scene.fit.free = vec![lobe];
+    });
+    let target = brighter(on_cpu(&baked));
+    let observed =
+        baked.with_scene(|scene| scene.views[0].target = Some(target)).sample().unwrap().observe().unwrap();
     let (task, params) = (observed.task(), observed.start().params);
     let views: Vec<&ViewSamples> = task.views.iter().map(|view| &view.samples).collect();
+    let shaded =
+        Shaded { setup: task.setup, params: &params, columns: &[lobe], illumination: &task.illumination };
+    let error = Shade::new(shared, &shaded, &views, Scatter::Exact).unwrap_err().to_string();
+    assert!(error.contains("specular_lobe") && error.contains("cube"), "{error}");
     let posed = observed.scene.mesh.pose();
-    for name in ["roughness", "gloss"] {
-        let columns = [Column::tied(param(name))];
-        let shaded = Shaded {
-            setup: task.setup,
-            params: &params,
-            columns: &columns,
-            illumination: &task.illumination,
-        };
-        let error = Shade::new(shared, &shaded, &views, Scatter::Exact).unwrap_err().to_string();
-        assert!(error.contains(name) && error.contains("cubes"), "{error}");
-        // The tensors' lobe would stay where the constants began.
-        let unknowns = ["base_weight", name].map(|name| Unknown::Param(Column::tied(param(name)))).to_vec();
-        let maps = MapTask::new(&observed, &posed, task.views.to_vec(), vec![MapKind::Color]);
-        let Err(error) = fit_maps(shared, MapTask { unknowns, ..maps }, &mut |_| {}) else {
-            panic!("{name} was fitted beside a map")
-        };
-        assert!(matches!(error, MapError::Sharpness { param } if param == name), "{error}");
-        assert!(error.to_string().contains(name), "{error}");
-    }
-    // E_s is another cube of its stack after each solve.
-    assert!(!Param::SpecularLobe.info().held);
+    let maps = MapTask::new(&observed, &posed, task.views.to_vec(), vec![MapKind::Environment]);
+    let error = MapFunction::new(shared, maps).err().unwrap();
+    assert!(matches!(error, MapError::Sharpness { param: "specular_lobe" }), "{error}");
+    assert!(error.to_string().contains("the environment"), "{error}");
 }

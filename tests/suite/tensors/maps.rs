@@ -40,9 +40,14 @@ fn small() -> Baked {
 
 /// Of its first `views` views.
 fn small_of(views: usize) -> Baked {
+    small_with(views, false, |_| ())
+}
+
+/// The same, changed before anything is baked, which is for a `fit` of what is free where that is wanted.
+pub(super) fn small_with(views: usize, fit: bool, change: impl FnOnce(&mut Scene)) -> Baked {
     let cache = Path::new(env!("CARGO_TARGET_TMPDIR")).join("graphics");
     let scene = demo::kept_scene(&cache, Some(&cache)).unwrap();
-    let options = PrepareOptions { cache: Some(cache), ..PrepareOptions::default() };
+    let options = PrepareOptions { cache: Some(cache), fit, ..PrepareOptions::default() };
     let mut loaded = Loaded::read(&scene, &options).unwrap();
     loaded.gains.truncate(views);
     let scene = &mut loaded.scene;
@@ -62,6 +67,7 @@ fn small_of(views: usize) -> Baked {
         let prior = scene.fit.maps.prior(kind);
         scene.fit.maps.set_prior(kind, MapPrior { smoothness: 0.0, closeness: 1e-9, ..prior });
     }
+    change(scene);
     loaded.bake().unwrap()
 }
 
@@ -75,7 +81,7 @@ fn darken<const C: usize>(map: &mut Option<Map<C>>, factor: f32) {
 }
 
 /// Means of squares of texels.
-fn shrunk<const C: usize>(map: &Map<C>) -> Map<C> {
+pub(super) fn shrunk<const C: usize>(map: &Map<C>) -> Map<C> {
     let step = map.width / TEXELS;
     let mean = |i: usize| {
         let (x, y) = (i % TEXELS * step, i / TEXELS * step);
@@ -85,12 +91,12 @@ fn shrunk<const C: usize>(map: &Map<C>) -> Map<C> {
     Map { width: TEXELS, height: TEXELS, texels: (0..TEXELS * TEXELS).map(mean).collect() }
 }
 
-fn sampled(baked: &Baked) -> Vec<ViewSamples> {
+pub(super) fn sampled(baked: &Baked) -> Vec<ViewSamples> {
     baked.clone().sample().unwrap().samples
 }
 
 /// What the scene looks like as it is, to be met by the samples of another.
-fn targets(truth: &Baked) -> Vec<(View, Target)> {
+pub(super) fn targets(truth: &Baked) -> Vec<(View, Target)> {
     let shader = Shader::new(truth.setup(), &truth.illumination, &truth.scene.params).unwrap();
     let samples = sampled(truth);
     (truth.scene.views.iter().zip(&samples))
@@ -103,7 +109,7 @@ fn targets(truth: &Baked) -> Vec<(View, Target)> {
         .collect()
 }
 
-fn observed(changed: &Baked, targets: &[(View, Target)]) -> Vec<ObservedView> {
+pub(super) fn observed(changed: &Baked, targets: &[(View, Target)]) -> Vec<ObservedView> {
     (sampled(changed).into_iter().zip(targets))
         .map(|(samples, (view, target))| {
             let view = View { target: Some(target.clone()), ..view.clone() };
@@ -114,7 +120,7 @@ fn observed(changed: &Baked, targets: &[(View, Target)]) -> Vec<ObservedView> {
 }
 
 /// The constants held, and the changed scene's maps fitted to images of the true one.
-fn fit(
+pub(super) fn fit(
     truth: &Baked,
     changed: &Baked,
     kind: MapKind,
@@ -137,7 +143,7 @@ fn task<'a>(
 }
 
 /// The root mean square of how far two scenes' samples differ in what `of` reads, by their shares of pixels.
-fn difference(a: &ViewSamples, b: &ViewSamples, of: fn(&ViewSamples, usize) -> [f32; 3]) -> f64 {
+pub(super) fn difference(a: &ViewSamples, b: &ViewSamples, of: fn(&ViewSamples, usize) -> [f32; 3]) -> f64 {
     let (mut sum, mut weight) = (0.0, 0.0);
     for slot in 0..a.records() * LANES {
         let share = f64::from(a.surface.weight(slot));
@@ -148,12 +154,12 @@ fn difference(a: &ViewSamples, b: &ViewSamples, of: fn(&ViewSamples, usize) -> [
     (sum / weight).sqrt()
 }
 
-fn albedo(view: &ViewSamples, slot: usize) -> [f32; 3] {
+pub(super) fn albedo(view: &ViewSamples, slot: usize) -> [f32; 3] {
     view.surface.fragment(slot).albedo
 }
 
 /// A change that no prior expects: waves over the map.
-fn wavy(texel: usize) -> f32 {
+pub(super) fn wavy(texel: usize) -> f32 {
     1.0 + 0.25 * (0.9 * (texel % TEXELS) as f32).sin() * (0.7 * (texel / TEXELS) as f32).cos()
 }
 
@@ -400,6 +406,7 @@ fn the_priors_are_the_weighted_means_of_squares() {
                 input,
                 grid: Grid::Texels { width: 3, height: 1 },
                 footprint: texels(3, 1, []),
+                in_atlas: None,
                 pairs: texel_pairs(3, 1),
                 start: spread(start).into_iter().map(|x| x as f32).collect(),
                 prior: MapPrior { smoothness, closeness, lower: 0.0, upper: 1.0 },

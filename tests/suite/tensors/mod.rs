@@ -4,12 +4,14 @@
 //! - `device`: one device, no copies; `drawn`: samples that the adapter drew
 //! - `matrices`: fixed linear maps
 //! - `maps`: fits of whole maps
-//! - `gradients`: the shading operation and its adjoint; `lit`: of lights, Fresnel and the sky
+//! - `gradients`: the shading operation and its adjoint; `lit`: of lights, Fresnel and the sky; `diffused`: of light that
+//!   scatters in texels
 
 pub(crate) mod bench;
 mod device;
+mod diffused;
 mod drawn;
 mod gradients;
-mod lit;
+pub(crate) mod lit;
 mod maps;
 mod matrices;

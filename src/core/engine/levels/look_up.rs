@@ -25,6 +25,14 @@ pub struct Corners<R> {
     shares: [[R; LANES]; 4],
 }
 
+impl<R: Copy> Corners<R> {
+    /// What the record's sample in a lane looks up, and what that counts.
+    #[must_use]
+    pub fn of(&self, lane: usize) -> [(u32, R); 4] {
+        std::array::from_fn(|k| (self.texels[k][lane], self.shares[k][lane]))
+    }
+}
+
 /// The four texels around texture coordinates; one that is not of `chart` counts nothing, and where none is, the chart's
 /// nearest counts alone. `None` where the chart has none.
 fn corners<R: Number>(atlas: &Atlas, uv: [f32; 2], chart: u32) -> Option<[(usize, R); 4]> {

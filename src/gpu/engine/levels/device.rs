@@ -8,7 +8,7 @@ use wgpu::{
     BindGroup, BindGroupLayout, Buffer, BufferUsages, CommandEncoder, ComputePassDescriptor, ComputePipeline,
 };
 
-use crate::atlas::{empty_near, packed};
+use super::stored::StoredAtlas;
 use crate::bake::stacks::Stack;
 use crate::compute::groups;
 use crate::constants::model_block;
@@ -18,8 +18,7 @@ use crate::engine::pipeline::{READ, WRITE, bind, buffer, encoder, layout, pipeli
 use crate::model::diffusion::Seams;
 use crate::model::params::Params;
 use crate::samples::Atlas;
-use crate::shader::atlas::buffers::{LevelShader, LevelShaders, Over, StoredTexels};
-use crate::shader::atlas::{Axis, TEXELS};
+use crate::shader::atlas::buffers::{LevelShader, LevelShaders, StoredTexels};
 use crate::{Gpu, GpuError};
 use skinfit_core::engine::view::ObservedView;
 use skinfit_core::program::graph::Input;
@@ -33,19 +32,8 @@ pub(in crate::engine) struct MadeLevels {
     /// The passes of the one that was used last.
     passes: Option<(bool, Vec<Pass>)>,
     levels: Buffer,
-    stored: Stored,
+    stored: StoredAtlas,
     count: u64,
-}
-
-/// What passes read of the atlas.
-struct Stored {
-    texels: Buffer,
-    records: Buffer,
-    /// Tiles along u and along v, and empty texels that lookups read, each with the one that it shows; and how many workgroups
-    /// these are.
-    lists: [(Buffer, u32); 3],
-    /// Workgroups of the covered texels.
-    workgroups: u32,
 }
 
 /// A pass.
@@ -88,7 +76,7 @@ impl MadeLevels {
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
         let levels = buffer(gpu, "levels", bytes as usize, usage);
         let dilated = dilates(fused);
-        let stored = Stored::new(gpu, &atlas, dilated);
+        let stored = StoredAtlas::new(gpu, &atlas, dilated);
         gpu.check()?;
         let (size, shaders) = (atlas.size(), [plain, turned]);
         Ok(Some(Self { size, dilated, shaders, passes: None, levels, stored, count: 0 }))
@@ -165,65 +153,16 @@ fn made_with(shader: &LevelShader, params: &Params) -> Vec<f64> {
     block.chain(stacks.map(|(stack, _)| stack.place(params))).collect()
 }
 
-/// Pairs of texels, packed: an empty one, and the one that it shows; itself where it takes the mean of its neighbours.
-fn filled(atlas: &Atlas) -> Vec<u32> {
-    let size = atlas.size();
-    if let Some(copies) = atlas.dilation().copies() {
-        let pair = |(texel, number): (u32, u32)| {
-            [packed([texel % size, texel / size]), packed(atlas.texel(number as usize))]
-        };
-        return copies.into_iter().flat_map(pair).collect();
-    }
-    let covered: Vec<[u32; 2]> = (0..atlas.covered()).map(|place| atlas.texel(place)).collect();
-    empty_near(&covered, size).into_iter().flat_map(|texel| [texel; 2]).collect()
-}
-
-impl Stored {
-    fn new(gpu: &Gpu, atlas: &Atlas, dilated: bool) -> Self {
-        let places = || (0..atlas.covered()).map(|place| atlas.texel(place));
-        let list = |places: Vec<u32>, each: u32| {
-            let workgroups = (places.len() as u32).div_ceil(each);
-            let places = if places.is_empty() { vec![0; 4] } else { places };
-            (gpu.buffer("texels", bytemuck::cast_slice(&places), BufferUsages::STORAGE), workgroups)
-        };
-        let texels: Vec<[u32; 2]> = places()
-            .enumerate()
-            .map(|(place, [column, row])| [row * atlas.size() + column, atlas.chart(place)])
-            .collect();
-        let records = match bytemuck::cast_slice(atlas.rows().all()) {
-            [] => &[0; 16],
-            bytes => bytes,
-        };
-        let tiles = |axis| list(crate::atlas::tiles(places(), axis), 1);
-        Self {
-            workgroups: (texels.len() as u32).div_ceil(TEXELS),
-            texels: gpu.buffer("covered texels", bytemuck::cast_slice(&texels), BufferUsages::STORAGE),
-            records: gpu.buffer("texels' records", records, BufferUsages::STORAGE),
-            lists: [
-                tiles(Axis::U),
-                tiles(Axis::V),
-                list(if dilated { filled(atlas) } else { Vec::new() }, 2 * TEXELS),
-            ],
-        }
-    }
-}
-
 impl Pass {
     fn new(
         gpu: &Gpu,
         shader: &LevelShader,
         own: &BindGroupLayout,
-        (levels, stored): (&Buffer, &Stored),
+        (levels, stored): (&Buffer, &StoredAtlas),
     ) -> Self {
         let inputs = Inputs::new(gpu, &shader.plan);
         let pipeline = pipeline(gpu, "levels", &shader.wgsl, &[&inputs.layout, own]);
-        let [across, down, empty] = &stored.lists;
-        let ((list, _), workgroups) = match shader.over {
-            Over::Texels => (across, stored.workgroups),
-            Over::Tiles(Axis::U) => (across, across.1),
-            Over::Tiles(Axis::V) => (down, down.1),
-            Over::Empty => (empty, empty.1),
-        };
+        let (list, workgroups) = stored.list(shader.over);
         let bound = bind(gpu, own, &[levels, &stored.texels, &stored.records, list]);
         Self { inputs, pipeline, bound, workgroups, with: None }
     }

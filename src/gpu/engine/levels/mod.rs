@@ -1,10 +1,13 @@
 //! What samples look up of the UV atlas: levels that the adapter makes and passes look up by texture coordinates, or what the
 //! processor has found of each sample.
 //!
-//! - this module: which of the two; `device`: the adapter's; `processor`: the other
+//! - this module: which of the two; `device`: the adapter's, `stored`: what these read; `processor`: the other
 
 mod device;
 mod processor;
+mod stored;
+
+pub use self::stored::StoredAtlas;
 
 use self::device::MadeLevels;
 use self::processor::UploadedLevels;

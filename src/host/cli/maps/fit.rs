@@ -21,7 +21,7 @@ use crate::render::shade::Shader;
 use crate::report::compared::compared;
 use crate::report::maps::MapView;
 use crate::report::metrics::Comparison;
-use crate::tensor::SharedDevice;
+use crate::tensor::{SharedDevice, TensorError};
 use skinfit_core::program::shading::ShadingError;
 
 impl MapArguments {
@@ -96,6 +96,7 @@ fn refusal(error: &MapError, scene: &Path) -> Refusal {
         MapError::TooLarge { .. } | MapError::OutOfMemory { .. } => Some("--adapter"),
         MapError::Unread { .. }
         | MapError::Beside { .. }
+        | MapError::InTexels { .. }
         | MapError::Sharpness { .. }
         | MapError::NotUnwrapped { .. } => Some("--maps"),
         MapError::Tensor(_)
@@ -110,6 +111,8 @@ fn refusal(error: &MapError, scene: &Path) -> Refusal {
     let option = option.map(|option| format!(" ({option})")).unwrap_or_default();
     let words = format!("{}: {}{option}.", scene.display(), what.trim_end_matches('.'));
     match error {
+        // What the scene asks for, and not what the adapter has.
+        MapError::Tensor(TensorError::Levels { .. } | TensorError::Model(_)) => Refusal::new(words),
         MapError::Tensor(_) | MapError::OutOfMemory { .. } | MapError::NotFinite { .. } => {
             Refusal::failure(words)
         }
@@ -118,6 +121,7 @@ fn refusal(error: &MapError, scene: &Path) -> Refusal {
         | MapError::TooLarge { .. }
         | MapError::Unread { .. }
         | MapError::Beside { .. }
+        | MapError::InTexels { .. }
         | MapError::Sharpness { .. }
         | MapError::Filtered { .. }
         | MapError::LaidOut { .. }

@@ -168,7 +168,7 @@ class Scene:
         unless part of a name is given).
 
         `docs/maps.md` says which scenes have such maps: `SceneError` is raised for others, `ParamError` where a constant is
-        free that acts through cubes which stay, or are maps (`roughness` and `gloss`, and of `environment` `specular_lobe`),
+        free that acts through a cube which is a map itself (of `environment` `specular_lobe`),
         `DeviceError` where there is no adapter or the library was built without (`features burn`).
         """
         if not maps:

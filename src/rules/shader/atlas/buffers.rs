@@ -19,9 +19,11 @@ use crate::shader::search::components;
 use crate::shader::tangent::chain::Chain;
 
 const HEAD: &str = include_str!("head_buffers.wgsl");
-const EACH_TEXEL: &str = include_str!("each_stored.wgsl");
+pub(super) const EACH_TEXEL: &str = include_str!("each_stored.wgsl");
 const NEIGHBOURS: &str = include_str!("neighbours_stored.wgsl");
 const BLUR: &str = include_str!("blur_stored.wgsl");
+/// What each texel that a blur reads weighs in its mean, and how that moves.
+pub(super) const WEIGH: &str = include_str!("weigh_stored.wgsl");
 const FILL: &str = include_str!("fill_stored.wgsl");
 
 /// What a shader's threads take.
@@ -107,9 +109,9 @@ impl LevelShaders {
 }
 
 /// What is written.
-struct Text<'a> {
-    layers: &'a Layers,
-    texels: &'a StoredTexels<'a>,
+pub(super) struct Text<'a> {
+    pub(super) layers: &'a Layers,
+    pub(super) texels: &'a StoredTexels<'a>,
 }
 
 impl Text<'_> {
@@ -121,21 +123,26 @@ impl Text<'_> {
         }
     }
 
-    fn head(&self) -> String {
+    pub(super) fn head(&self) -> String {
         HEAD.replace("{size}", &self.texels.size.to_string())
     }
 
     /// Where a level begins in the buffer.
-    fn level(&self, name: &str) -> String {
+    pub(super) fn level(&self, name: &str) -> String {
         let place = self.layers.place(name).unwrap_or(0);
         format!("{}u", place * self.texels.size as usize * self.texels.size as usize)
     }
 
-    /// A draw, or what neighbours say.
-    fn each_texel(&self, named: &Named<'_>) -> LevelShader {
-        let (pass, plan) = (named.pass, &named.pass.plan);
-        let neighbours = pass.kind == PassKind::Neighbours;
-        let (mut text, mut set) = (plan.wgsl.clone(), String::new());
+    /// The text of what rules make of a stored texel, and the lines that set what they read of it, `at`: the levels of the plan
+    /// but for the first ones, each of which stands by the name that `named` gives it.
+    pub(super) fn of_texel(
+        &self,
+        plan: &Plan,
+        wgsl: &str,
+        first: usize,
+        named: &dyn Fn(&str) -> String,
+    ) -> (String, String) {
+        let (mut text, mut set) = (wgsl.to_owned(), String::new());
         for &(name, kind) in &plan.varyings {
             for (call, ending) in [("dpdx", "along_u"), ("dpdy", "along_v")] {
                 let (taken, held) = (format!("{call}({name})"), format!("{name}_{ending}"));
@@ -146,17 +153,26 @@ impl Text<'_> {
             }
             let _ = writeln!(set, "    at.{name} = {};", self.held(name, kind));
         }
-        // What is read of neighbours is no number of the texel.
-        let own = plan.levels.iter().skip(usize::from(neighbours));
+        let own = plan.levels.iter().skip(first);
         for level in own.filter(|level| text.contains(&format!("    {}: {},", level.name, level.kind))) {
             let _ = writeln!(
                 set,
                 "    at.{} = level_texel({}, here).{};",
                 level.name,
-                self.level(&named.name(&level.name)),
+                self.level(&named(&level.name)),
                 level.swizzle()
             );
         }
+        (text, set)
+    }
+
+    /// A draw, or what neighbours say.
+    fn each_texel(&self, named: &Named<'_>) -> LevelShader {
+        let (pass, plan) = (named.pass, &named.pass.plan);
+        let neighbours = pass.kind == PassKind::Neighbours;
+        // What is read of neighbours is no number of the texel.
+        let (text, set) =
+            self.of_texel(plan, &plan.wgsl, usize::from(neighbours), &|level| named.name(level));
         // Extensions are to stand before all else.
         let mut wgsl = text;
         wgsl.push_str(&self.head());
@@ -245,6 +261,7 @@ impl Text<'_> {
         let value = format!("    leave({leaf}, here, vec4f(middle.xyz + mean, middle.w));\n");
         let [_, own] = lines_of(axis);
         let body = BLUR
+            .replace("{weigh}", WEIGH)
             .replace("{own}", own)
             .replace("{axis}", axis.step())
             .replace("{across}", axis.across().step())
@@ -264,7 +281,7 @@ impl Text<'_> {
     }
 
     /// The line that reads a level's quantity at a texel.
-    fn read(&self, name: &str, level: &Level) -> String {
+    pub(super) fn read(&self, name: &str, level: &Level) -> String {
         let (place, swizzle) = (self.level(name), level.swizzle());
         format!("    let {}: {} = level_texel({place}, here).{swizzle};\n", level.name, level.kind)
     }

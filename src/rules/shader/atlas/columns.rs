@@ -25,7 +25,7 @@ fn change(k: &str, slope: &str) -> [String; 2] {
 }
 
 /// How the mean moves then.
-fn by_weights(k: &str) -> String {
+pub(super) fn by_weights(k: &str) -> String {
     format!("(change{k}.xyz - change{k}.w * mean) / whole")
 }
 

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::Level;
 use super::named::Named;
 
 /// Where levels stand in the buffer, counted in levels.
@@ -22,16 +23,15 @@ impl Layers {
     /// Of all that passes leave. What a blur leaves along u nobody reads but its second direction: these take turns.
     pub(super) fn new(groups: &[Vec<Named<'_>>]) -> Self {
         let mut layers = Self::default();
-        let between = |name: &str| name.ends_with("_along_u");
         for (name, _) in groups.iter().flatten().flat_map(Named::leaves) {
-            if !between(&name) && !layers.places.contains_key(&name) {
+            if !Level::is_half(&name) && !layers.places.contains_key(&name) {
                 layers.places.insert(name, layers.count);
                 layers.count += 1;
             }
         }
         let lasting = layers.count;
         for group in groups {
-            let halves = group.iter().flat_map(Named::leaves).filter(|(name, _)| between(name));
+            let halves = group.iter().flat_map(Named::leaves).filter(|(name, _)| Level::is_half(name));
             for (k, (name, _)) in halves.enumerate() {
                 layers.places.insert(name, lasting + k);
                 layers.count = layers.count.max(lasting + k + 1);

@@ -1,7 +1,11 @@
 //! Levels of the atlas, and its axes.
 
+use crate::shader::search::components;
+
 /// The ending of levels whose empty texels were filled.
 const DILATED: &str = "_dilated";
+/// That of what a blur leaves along u, which nobody reads but its second direction.
+const HALF: &str = "_along_u";
 
 /// A texture of the atlas: a quantity of its texels, or one that is blurred along u alone.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -31,6 +35,25 @@ impl Level {
     /// The quantity that a fragment finds there.
     pub(in crate::shader) fn quantity(&self) -> &str {
         self.name.strip_suffix(DILATED).unwrap_or(&self.name)
+    }
+
+    /// What a blur of a quantity leaves along u.
+    pub(super) fn half_of(quantity: &str, kind: &'static str) -> Self {
+        Self::new(format!("{quantity}{HALF}"), kind)
+    }
+
+    /// Whether a level of that name is such a half.
+    #[must_use]
+    pub fn is_half(name: &str) -> bool {
+        name.ends_with(HALF)
+    }
+
+    /// How it moves where one of its numbers does, as WGSL of its type.
+    #[must_use]
+    pub fn unit(&self, component: usize) -> String {
+        let number = |c| if c == component { "1.0" } else { "0.0" };
+        let numbers: Vec<&str> = (0..components(self.kind)).map(number).collect();
+        format!("{}({})", self.kind, numbers.join(", "))
     }
 
     /// The components of a texel that hold it.

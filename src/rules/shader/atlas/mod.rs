@@ -14,8 +14,9 @@
 //! - `text`: their WGSL; `kernel`: that of blurs; `function`: the same as functions for another engine
 //! - [`tangent`]: passes that leave how levels move; [`named`]: these beside the plan's
 //! - [`buffers`]: passes over stored texels as compute shaders, for the engine on an adapter (`layers`: where levels stand;
-//!   `columns`: what moves beside what is blurred)
+//!   `columns`: what moves beside what is blurred); [`adjoint`]: the same backwards
 
+pub mod adjoint;
 pub mod buffers;
 mod columns;
 mod function;
@@ -210,11 +211,6 @@ fn draw(
     Ok(Pass { kind: PassKind::Draw, leaves: leaves.to_vec(), plan, moving: None })
 }
 
-/// The name of what a blur leaves along u.
-fn halfway(rule: &Rule) -> String {
-    format!("{}_along_u", rule.gives[0].0)
-}
-
 /// The passes of a rule that reads texels' neighbours: of a blur along the axes one along u, then one along v.
 fn blurs_of(facts: &Facts, rule: &'static Rule) -> Vec<Pass> {
     let Some(blur) = &rule.blur else { return Vec::new() };
@@ -233,10 +229,9 @@ fn blurs_of(facts: &Facts, rule: &'static Rule) -> Vec<Pass> {
         let leaves = vec![Level::new(rule.gives[0].0, kind)];
         return vec![Pass { kind: PassKind::Surface, leaves, plan, moving: None }];
     }
-    let directions = [
-        (Axis::U, Level::new(blur.of, kind), Level::new(halfway(rule), kind)),
-        (Axis::V, Level::new(halfway(rule), kind), Level::new(rule.gives[0].0, kind)),
-    ];
+    let half = || Level::half_of(rule.gives[0].0, kind);
+    let directions =
+        [(Axis::U, Level::new(blur.of, kind), half()), (Axis::V, half(), Level::new(rule.gives[0].0, kind))];
     let pass = |(axis, source, leaves): (Axis, Level, Level)| {
         let mut plan = blur_plan(facts, rule, &source);
         plan.wgsl = kernel::blur(&plan, rule, axis, &source);

@@ -65,7 +65,7 @@ impl Along {
         let needs = || plan.steps.iter().flat_map(|step| &step.rule.needs);
         let tangent = |name: &'static str| Some((name, self.moved.get(name)?.name.clone()));
         let read = needs().filter_map(|(name, _)| tangent(name)).collect();
-        let chain = Chain::of_texels(&plan, seed, read)?;
+        let chain = Chain::of_texels(&plan, std::slice::from_ref(seed), vec![read])?;
         plan.resources.extend(&chain.resources);
         plan.constants.extend(&chain.constants);
         let moves = |level: &&Level| chain.moved[0].contains_key(level.name.as_str());
@@ -138,7 +138,12 @@ impl Along {
     }
 
     /// How a kernel's value moves; `None` where it stays.
-    fn kernel_slope(&self, pass: &Pass, rule: &Rule, seed: &Seed) -> Result<Option<Slope>, TangentError> {
+    pub(super) fn kernel_slope(
+        &self,
+        pass: &Pass,
+        rule: &Rule,
+        seed: &Seed,
+    ) -> Result<Option<Slope>, TangentError> {
         let mut levels = Vec::new();
         let mut along = |name: &str| match &seed.named {
             Some(named) if named.name == name => Some(named.tangent.clone()),

@@ -115,13 +115,16 @@ impl Chain {
         self.along.iter().enumerate().flat_map(of_seed).collect()
     }
 
-    /// Of the texels of a draw into the atlas along one seed; `moved` are quantities whose tangents stand there. The
-    /// quantities that move are `moved[0]`.
-    pub(in crate::shader) fn of_texels(plan: &Plan, seed: &Seed, moved: Moved) -> Result<Self, TangentError> {
+    /// Of the texels of a draw into the atlas; `read` are for each seed quantities whose tangents stand there. The quantities
+    /// that move along the `k`-th seed are `moved[k]`.
+    pub(in crate::shader) fn of_texels(
+        plan: &Plan,
+        seeds: &[Seed],
+        read: Vec<Moved>,
+    ) -> Result<Self, TangentError> {
         let mut tangents = Tangents::new(&plan.declarations(true))?;
         let mut chain = Self::default();
-        chain.moved =
-            chain.follow(plan, Domain::Texel, std::slice::from_ref(seed), vec![moved], &mut tangents)?;
+        chain.moved = chain.follow(plan, Domain::Texel, seeds, read, &mut tangents)?;
         chain.functions.push_str(tangents.text());
         Ok(chain)
     }

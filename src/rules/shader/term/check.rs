@@ -76,7 +76,7 @@ const TAKEN: [&str; 53] = [
 ];
 
 /// Functions of the modules, and what else these declare outside of functions.
-const FUNCTIONS: [&str; 47] = [
+const FUNCTIONS: [&str; 59] = [
     "level_corners",
     "level_at",
     "sample_level",
@@ -124,6 +124,18 @@ const FUNCTIONS: [&str; 47] = [
     "is_inside",
     "filled",
     "covered_texel",
+    "gained",
+    "give",
+    "adjoints",
+    "largest",
+    "sums",
+    "unit_exponent",
+    "power_of_two",
+    "add_exactly",
+    "exact_sum",
+    "add_fast",
+    "fast_sum",
+    "by_columns",
 ];
 
 /// Whether a name is one of those that the passes over the atlas make of others': `NAME_level` is a level as it is bound,
