@@ -17,7 +17,8 @@ use crate::fit::{FitOptions, fit_watched};
 use crate::held::hold;
 use crate::message::{Ask, At, Request, Say, Told};
 use crate::prepare::{
-    JointScene, JointScenes, Loaded, NamedScene, PrepareError, PrepareOptions, ReadyScene, read_one_skin_each,
+    Baked, JointScene, JointScenes, Loaded, NamedScene, PrepareError, PrepareOptions, ReadyScene,
+    read_one_skin_each,
 };
 use crate::render::shade::Shader;
 use crate::report::compared::compared;
@@ -151,7 +152,8 @@ impl UnderWay {
             if held.is_all_of(&baked.scene) {
                 return Ok(ReadyScene { name, baked, held, engine: None });
             }
-            let observed = baked.sample()?.observe()?;
+            // Files that are held in memory stay there: what is found with the samples is not kept.
+            let observed = Baked { cache: None, ..baked }.sample()?.observe()?;
             let engine = observed.engine()?;
             Ok(ReadyScene { name, baked: observed.baked, held, engine: Some(Box::new(engine)) })
         };

@@ -188,7 +188,7 @@ pub fn write_run(folder: &Path, run: &RunInfo, outcome: &Outcome) -> Result<Repo
         bar.inc(1);
         told
     });
-    // Of several files that cannot be written the first view's is told, on any number of threads.
+    // Of the views whose files could not be written the first one is told.
     for told in told.collect::<Vec<_>>() {
         let Told { files, warnings: own, summary, error } = told?;
         warnings.extend(own);

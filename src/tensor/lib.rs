@@ -5,6 +5,7 @@
 //! - [`shade`]: the model as an operation, of what is [`Shaded`]; [`inputs`]: what it takes; `stage`: its passes;
 //!   `scatter`: what lookups of a cube gained, added to its texels
 //! - [`levels`]: what is computed in texels of the UV atlas, likewise; `operation`: what burn sees of both
+//! - `row_sums`: sums of rows in a fixed tree; `atomic_sums.wgsl`: of what many threads add, exact or fast
 //! - `drawn`: samples that the adapter drew, as tensors
 //! - [`adjoint`]: the text of those passes: the image of stored samples, and its vector-Jacobian product
 //! - [`footprint`]: the linear maps of a scene: texels, vertices, cube borders
@@ -25,12 +26,12 @@ pub mod levels;
 pub mod maps;
 mod operation;
 mod pass;
+mod row_sums;
 mod scatter;
 pub mod shade;
 mod shaded;
 pub mod sparse;
 mod stage;
-mod sum;
 
 pub use device::SharedDevice;
 pub use inputs::{Input, Inputs};

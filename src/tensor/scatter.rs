@@ -18,7 +18,7 @@ pub(super) struct Scattering {
 
 impl Scattering {
     pub(super) fn new(gpu: &Gpu, way: Scatter) -> Result<Self, GpuError> {
-        let text = concat!(include_str!("scatter.wgsl"), include_str!("sums.wgsl"));
+        let text = concat!(include_str!("scatter.wgsl"), include_str!("atomic_sums.wgsl"));
         let module = pass::module(gpu, "scatter", text)?;
         let pipeline = |entry| pass::pipeline(gpu, &module, entry);
         let (scatter, sums) = match way {

@@ -189,7 +189,7 @@ impl Shader {
         }
         for own in sums.chunks_mut(self.stride()) {
             for c in 0..3 {
-                own[whole + c] = own[c..whole].iter().step_by(3).sum();
+                own[whole + c] = own[..whole].iter().skip(c).step_by(3).sum();
             }
         }
     }

@@ -20,12 +20,12 @@ use crate::gpu::{Gpu, GpuError};
 use crate::inputs::{INPUTS, Input};
 use crate::model::params::{Column, Param};
 use crate::operation::Operation as _;
+use crate::row_sums::RowSums;
 use crate::shaded::Scatter;
 use crate::shader::atlas::Level;
 use crate::shader::atlas::adjoint::{PassAdjoint, PassAdjoints};
 use crate::shader::atlas::buffers::Over;
 use crate::shader::tangent::chain::Seed;
-use crate::sum::Sums;
 use crate::{TensorError, pass};
 
 /// The passes backwards, by what is wanted of them.
@@ -33,7 +33,7 @@ use crate::{TensorError, pass};
 pub(super) struct Adjoints {
     scatter: Scatter,
     known: Mutex<HashMap<Vec<Input>, Arc<Compiled>>>,
-    sums: Sums,
+    sums: RowSums,
     take: ComputePipeline,
     largest: ComputePipeline,
     accumulate: ComputePipeline,
@@ -59,7 +59,7 @@ struct CompiledPass {
 
 impl Adjoints {
     pub(super) fn new(gpu: &Gpu, scatter: Scatter, take: &ShaderModule) -> Result<Self, GpuError> {
-        let text = concat!(include_str!("accumulate.wgsl"), include_str!("../sums.wgsl"));
+        let text = concat!(include_str!("accumulate.wgsl"), include_str!("../atomic_sums.wgsl"));
         let module = pass::module(gpu, "adjoints of levels", text)?;
         let accumulate = match scatter {
             Scatter::Exact => "cs_exact",
@@ -68,7 +68,7 @@ impl Adjoints {
         Ok(Self {
             scatter,
             known: Mutex::default(),
-            sums: Sums::new(gpu)?,
+            sums: RowSums::new(gpu)?,
             take: pass::pipeline(gpu, take, "cs_adjoints")?,
             largest: pass::pipeline(gpu, &module, "cs_largest")?,
             accumulate: pass::pipeline(gpu, &module, accumulate)?,
@@ -77,7 +77,14 @@ impl Adjoints {
 
     /// That there are derivatives by `wanted`.
     pub(super) fn check(&self, stage: &LevelStage, wanted: &[Input]) -> Result<(), TensorError> {
-        parts(stage, wanted).try_for_each(|part| self.compiled(stage, part).map(|_| ()))
+        parts(stage, wanted).try_for_each(|part| {
+            let compiled = self.compiled(stage, part)?;
+            let sizes = self.sizes(stage, &compiled, part).into_iter();
+            sizes
+                .map(|(what, numbers)| stage.shared.gpu().check_binding(what, bytes(numbers)))
+                .collect::<Result<(), _>>()?;
+            Ok(())
+        })
     }
 
     /// What each of `wanted` gets of an adjoint of the levels that samples look up.
@@ -146,17 +153,24 @@ impl Adjoints {
         Ok(lent.beside.into_iter().skip(1).map(TensorBuffer::into_tensor).collect())
     }
 
-    fn room(&self, stage: &LevelStage, compiled: &Compiled, wanted: &[Input]) -> Result<Room, GpuError> {
-        let (gpu, places) = (stage.shared.gpu(), stage.places());
-        let scratch = |what: &str, numbers: usize| gpu.scratch(what, 4 * numbers.max(1) as u64);
+    /// What buffers of a run hold, and how many numbers these are.
+    fn sizes(&self, stage: &LevelStage, compiled: &Compiled, wanted: &[Input]) -> [(&'static str, usize); 4] {
         let words = if self.scatter == Scatter::Exact { 2 } else { 1 };
         let columns = if wanted.contains(&Input::Columns) { stage.free.columns.len() } else { 0 };
-        Ok(Room {
-            adjoints: scratch("adjoints of levels", 3 * places * compiled.count)?,
-            largest: scratch("the largest adjoint", 1)?,
-            sums: scratch("sums of adjoints of levels", 3 * places * words)?,
-            by_columns: scratch("what columns get of each texel", columns * stage.texels())?,
-        })
+        [
+            ("adjoints of levels", 3 * stage.places() * compiled.count),
+            ("largest adjoint", 1),
+            ("sums of adjoints of levels", 3 * stage.places() * words),
+            ("slopes by columns of each texel of the light map", columns * stage.texels()),
+        ]
+    }
+
+    fn room(&self, stage: &LevelStage, compiled: &Compiled, wanted: &[Input]) -> Result<Room, GpuError> {
+        let gpu = stage.shared.gpu();
+        let made =
+            self.sizes(stage, compiled, wanted).map(|(what, numbers)| gpu.scratch(what, bytes(numbers)));
+        let [adjoints, largest, sums, by_columns] = made;
+        Ok(Room { adjoints: adjoints?, largest: largest?, sums: sums?, by_columns: by_columns? })
     }
 
     fn encode(
@@ -220,6 +234,11 @@ struct Room {
     largest: Buffer,
     sums: Buffer,
     by_columns: Buffer,
+}
+
+/// Of numbers of 32 bits; no buffer is empty.
+fn bytes(numbers: usize) -> u64 {
+    4 * numbers.max(1) as u64
 }
 
 /// A texel may be read by every blurred one.

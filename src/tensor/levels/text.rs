@@ -124,7 +124,7 @@ fn given(leaf: usize, scatter: Scatter, headroom: u32) -> String {
          return vec3f(adjoints[at], adjoints[at + 1u], adjoints[at + 2u]);\n}}\n\n\
          fn give(place: vec2i, number: vec3f) {{\n    let at = 3u * u32(place.y * SIZE + place.x);\n    \
          for (var c = 0u; c < 3u; c++) {{\n        {add};\n    }}\n}}\n",
-        include_str!("../sums.wgsl")
+        include_str!("../atomic_sums.wgsl")
     )
 }
 

@@ -35,8 +35,8 @@ pub(super) struct Evaluation<'a> {
     of: &'a Variables,
     tensors: Tensors,
     params: Params,
-    /// How each stack's cube moves with the place that it is taken at.
-    cube_slopes: Vec<Cube<f32>>,
+    /// The stacks whose cubes are taken, and how each moves with the place that it is taken at.
+    cube_slopes: Vec<(Stack, Cube<f32>)>,
     /// Of each view.
     gains: Vec<Gain>,
     columns: Option<Tensor<1>>,
@@ -77,7 +77,7 @@ impl Variables {
         let texels = texels.collect::<Result<_, MapError>>()?;
         let chosen = self.stacks.iter().filter_map(|stack| {
             let (cube, slope) = stack.at(&self.illumination, stack.place(&point.params))?;
-            Some(((input_of(*stack), cube_tensor(&self.shared, &cube)), slope))
+            Some(((input_of(*stack), cube_tensor(&self.shared, &cube)), (*stack, slope)))
         });
         let (cubes, cube_slopes): (Vec<_>, Vec<_>) = chosen.unzip();
         let tensors = Tensors { columns: column_tensor(&self.shared, &self.columns, point), cubes, texels };
@@ -161,24 +161,20 @@ impl Evaluation<'_> {
         let Self { of, params, cube_slopes, columns, cubes, texels, by_gain, .. } = self;
         let columns = columns.map_or(Ok(Vec::new()), read)?;
         // By the place that each stack's cube is taken at.
-        let by_place = |(cube, slope): (Option<Tensor<2>>, Cube<f32>)| -> Result<f64, TensorError> {
-            let Some(cube) = cube else { return Ok(0.0) };
+        let by_place = |(cube, (stack, slope)): (Option<Tensor<2>>, (Stack, Cube<f32>))| {
+            let Some(cube) = cube else { return Ok((stack.paces(&params), 0.0)) };
             // Not burn's sum, which adds in the order in which threads come.
             let pairs = read(cube)?.into_iter().zip(slope.padded().as_flattened());
-            Ok(pairs.map(|(a, &b)| f64::from(a) * f64::from(b)).sum())
+            let slope: f64 = pairs.map(|(a, &b)| f64::from(a) * f64::from(b)).sum();
+            Ok::<_, TensorError>((stack.paces(&params), slope))
         };
-        let by_places: Vec<f64> =
-            cubes.into_iter().zip(cube_slopes).map(by_place).collect::<Result<_, _>>()?;
-        let paces: Vec<_> = of.stacks.iter().map(|stack| stack.paces(&params)).collect();
+        let by_places: Vec<_> = cubes.into_iter().zip(cube_slopes).map(by_place).collect::<Result<_, _>>()?;
         let by_cubes = |param: Param| -> f64 {
-            let by = |(slope, paces): (&f64, &Vec<(&str, f64)>)| {
-                paces
-                    .iter()
-                    .filter(|(name, _)| *name == param.name())
-                    .map(|(_, pace)| slope * pace)
-                    .sum::<f64>()
+            let of = |(paces, slope): &(Vec<(&str, f64)>, f64)| {
+                let own = paces.iter().filter(|(name, _)| *name == param.name());
+                own.map(|(_, pace)| slope * pace).sum::<f64>()
             };
-            by_places.iter().zip(&paces).map(by).sum()
+            by_places.iter().map(of).sum()
         };
         let by_column = |column: &Column| {
             let place = of.columns.iter().position(|other| other == column);

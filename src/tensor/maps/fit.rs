@@ -236,7 +236,8 @@ impl Rounds<'_, '_> {
             let (cube, _) = stack.at(&self.illumination, stack.place(&self.constants.params))?;
             Some((input_of(stack), cube_tensor(self.shared, &cube)))
         };
-        let cubes: Vec<_> = Stack::ALL.into_iter().filter_map(cube).collect();
+        let read = Stack::ALL.into_iter().filter(|stack| self.problem.reads(input_of(*stack)));
+        let cubes: Vec<_> = read.filter_map(cube).collect();
         self.problem.set_constants(&columns, &cubes)?;
         self.step(round, "constants", losses, 0.0);
         Ok(())

@@ -14,12 +14,10 @@ use crate::engine::view::ObservedView;
 use crate::footprint::{cube_border, cube_pairs, edges, texel_pairs, texels, vertices};
 use crate::levels::HELD;
 use crate::model::cube::Cube;
-use crate::model::effects::Effect;
 use crate::model::params::Param;
 use crate::samples::atlas::listed;
 use crate::samples::{Hit, sample_hits};
 use crate::scene::MapKind;
-use crate::shader::term::of_texels;
 use crate::{Input, Levels, SharedDevice, TensorError};
 
 /// Texels along a side of a map that the scene leaves out, where there is no other to go by.
@@ -55,10 +53,6 @@ pub fn layers(
         let mut read: Vec<LayerParts> = read.collect();
         for parts in &mut read {
             parts.in_atlas = parts.in_atlas.take().filter(|_| in_texels(parts.input));
-            if matches!(parts.grid, Grid::Cube(_)) && in_texels(parts.input) {
-                let effect = of_texels(scene.effects).map_or("", Effect::name);
-                return Err(MapError::InTexels { map: kind.name(), effect });
-            }
         }
         if read.is_empty() {
             return Err(MapError::Unread { map: kind.name(), effects: kind.effects() });

@@ -103,6 +103,12 @@ impl Problem {
         Ok(problem)
     }
 
+    /// Whether the images follow an input.
+    pub(super) fn reads(&self, input: Input) -> bool {
+        let in_texels = self.levels.as_ref().is_some_and(|(levels, _)| levels.reads(input));
+        in_texels || self.parts.iter().any(|part| part.shade.reads(input))
+    }
+
     /// Make levels anew.
     fn make_levels(&mut self) -> Result<(), TensorError> {
         if let Some((levels, inputs)) = &self.levels {

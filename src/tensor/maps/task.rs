@@ -5,14 +5,18 @@ use std::sync::atomic::AtomicBool;
 
 use super::MapError;
 use super::function::acts_through_cubes;
+use crate::TensorError;
+use crate::adjoint::plan_of;
 use crate::bake::Illumination;
 use crate::engine::view::ObservedView;
 use crate::engine::{Point, Unknown};
 use crate::levels::atlas_of;
+use crate::model::effects::Effect;
 use crate::prepare::Baked;
 use crate::samples::ViewSamples;
 use crate::scene::mesh::PosedMesh;
 use crate::scene::{MapKind, Scene};
+use crate::shader::term::of_texels;
 
 /// What is to be fitted.
 pub struct MapTask<'a> {
@@ -67,10 +71,20 @@ impl<'a> MapTask<'a> {
         }
     }
 
+    /// Whether what is computed in texels reads cubes.
+    fn texels_look_up(&self) -> Result<bool, TensorError> {
+        let plan = plan_of(self.scene.setup(), &[], true)?;
+        Ok(plan.passes.iter().any(|pass| !pass.plan.resources.is_empty()))
+    }
+
     /// That tensors make what the scene asks for, and that no constant is free which acts through a cube that is fitted.
     pub(super) fn check(&self) -> Result<(), MapError> {
         let views: Vec<&ViewSamples> = self.observed.iter().map(|view| &view.samples).collect();
-        atlas_of(self.scene.setup(), &views)?;
+        let in_texels = atlas_of(self.scene.setup(), &views)?.is_some() && self.texels_look_up()?;
+        if in_texels && self.kinds.contains(&MapKind::Environment) {
+            let effect = of_texels(self.scene.effects).map_or("", Effect::name);
+            return Err(MapError::InTexels { map: MapKind::Environment.name(), effect });
+        }
         let mut free = self.unknowns.iter().filter_map(Unknown::column).map(|column| column.param);
         match free.find(|&param| acts_through_cubes(param, &self.kinds)) {
             Some(param) => Err(MapError::Sharpness { param: param.name() }),

@@ -17,9 +17,9 @@ use super::buffer::{TensorBuffer, check_shape, lend};
 use super::drawn::Planes;
 use super::inputs::{INPUTS, Input};
 use super::operation::Operation;
+use super::row_sums::RowSums;
 use super::scatter::Scattering;
 use super::shaded::{Scatter, Shaded};
-use super::sum::Sums;
 use super::{SharedDevice, TensorError, pass};
 use crate::adjoint::{Adjoint, Binding, Module};
 use crate::gpu::engine::DeviceSamples;
@@ -46,7 +46,7 @@ pub(super) struct Stage {
     /// By what is wanted.
     backward: Mutex<HashMap<Vec<Input>, Compiled>>,
     scattering: Scattering,
-    sums: Sums,
+    sums: RowSums,
 }
 
 #[derive(Clone, Debug)]
@@ -106,7 +106,7 @@ impl Stage {
             forward: Compiled::new(gpu, &adjoint.forward())?,
             backward: Mutex::default(),
             scattering: Scattering::new(gpu, scatter)?,
-            sums: Sums::new(gpu)?,
+            sums: RowSums::new(gpu)?,
             shared: shared.clone(),
             adjoint,
             slots,

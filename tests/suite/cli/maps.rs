@@ -98,9 +98,11 @@ fn the_roughness_of_a_lobe_is_fitted_beside_maps() {
     sandbox.edit("hilite = 0.7\n", "hilite = 0.7\nroughness = 0.4\ngloss = 0.2\n");
     sandbox.fit("run", &["--maps", "color"]).done();
     let report = sandbox.json("run/report.json");
-    for name in ["roughness", "gloss"] {
-        assert!(report["params"][name]["value"].as_f64().is_some(), "{name}: {}", report["params"]);
-    }
+    let moved = |(name, start): (&str, f64)| {
+        let value = report["params"][name]["value"].as_f64().unwrap_or_else(|| panic!("{name}: {report}"));
+        (value - start).abs() > 1e-3
+    };
+    assert!([("roughness", 0.4), ("gloss", 0.2)].into_iter().any(moved), "{}", report["params"]);
 }
 
 #[cfg(feature = "burn")]

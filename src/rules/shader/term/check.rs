@@ -19,7 +19,9 @@ use crate::shader::rule::{LIBRARY, RULES, Rule};
 use crate::shader::search::components;
 
 /// Words that the modules which rules are built into give a meaning of their own.
-const TAKEN: [&str; 53] = [
+const TAKEN: [&str; 55] = [
+    "adjoint",
+    "mean",
     "weighs",
     "whole",
     "change",
@@ -139,9 +141,11 @@ const FUNCTIONS: [&str; 59] = [
 ];
 
 /// Whether a name is one of those that the passes over the atlas make of others': `NAME_level` is a level as it is bound,
-/// `NAME_along_u` what the first direction of a blur leaves, `NAME_dilated` what fills empty texels, `d_NAME` how a level moves.
+/// `NAME_along_u` what the first direction of a blur leaves, `NAME_dilated` what fills empty texels, `d_NAME` how a level moves,
+/// `NAME_gradient` what an input of tensors gets.
 fn is_made(name: &str) -> bool {
-    name.starts_with("d_") || ["_level", "_along_u", "_dilated"].iter().any(|ending| name.ends_with(ending))
+    name.starts_with("d_")
+        || ["_level", "_along_u", "_dilated", "_gradient"].iter().any(|ending| name.ends_with(ending))
 }
 
 /// The declaration, where it fits.

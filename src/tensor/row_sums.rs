@@ -8,11 +8,11 @@ use crate::gpu::{Gpu, GpuError};
 
 /// The pass that adds sixty-four rows.
 #[derive(Debug)]
-pub(super) struct Sums(ComputePipeline);
+pub(super) struct RowSums(ComputePipeline);
 
-impl Sums {
+impl RowSums {
     pub(super) fn new(gpu: &Gpu) -> Result<Self, GpuError> {
-        let module = pass::module(gpu, "sum", include_str!("sum.wgsl"))?;
+        let module = pass::module(gpu, "sums of rows", include_str!("row_sums.wgsl"))?;
         Ok(Self(pass::pipeline(gpu, &module, "cs_main")?))
     }
 
