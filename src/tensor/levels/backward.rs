@@ -79,10 +79,8 @@ impl Adjoints {
     pub(super) fn check(&self, stage: &LevelStage, wanted: &[Input]) -> Result<(), TensorError> {
         parts(stage, wanted).try_for_each(|part| {
             let compiled = self.compiled(stage, part)?;
-            let sizes = self.sizes(stage, &compiled, part).into_iter();
-            sizes
-                .map(|(what, numbers)| stage.shared.gpu().check_binding(what, bytes(numbers)))
-                .collect::<Result<(), _>>()?;
+            let check = |(what, numbers)| stage.shared.gpu().check_binding(what, bytes(numbers));
+            self.sizes(stage, &compiled, part).into_iter().try_for_each(check)?;
             Ok(())
         })
     }
