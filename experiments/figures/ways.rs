@@ -23,8 +23,17 @@ const LIGHT: [&str; 12] = [
     "normal_filter",
     "shadows",
 ];
-const DIFFUSION: [&str; 8] =
-    ["taps", "light_map_size", "seams", "ambient_normal", "stretch", "unblurred", "combined", "levels"];
+const DIFFUSION: [&str; 9] = [
+    "taps",
+    "light_map_size",
+    "seams",
+    "ambient_normal",
+    "stretch",
+    "unblurred",
+    "combined",
+    "levels",
+    "transmission",
+];
 
 /// Plots of the forest that the page shows.
 const PLOTS: [&str; 5] = ["shadows", "sky_lights", "visibility", "specular_visibility", "rays"];

@@ -172,7 +172,7 @@ pub(super) fn nothing(shared: &SharedDevice) -> Tensor<2> {
 }
 
 /// A cube's texels with their border.
-pub(super) fn cube(shared: &SharedDevice, cube: Option<&Cube<f32>>) -> Tensor<2> {
+fn cube(shared: &SharedDevice, cube: Option<&Cube<f32>>) -> Tensor<2> {
     let Some(cube) = cube else { return nothing(shared) };
     matrix(shared, cube.padded().as_flattened().to_vec(), [cube.padded().len(), 4])
 }
@@ -199,14 +199,26 @@ fn inputs(
         }
         matrix(shared, numbers, [stage.samples, width])
     };
-    let [irradiance, lobe, hilite, reflected, glossy] = cubes.map(|of| cube(shared, of));
     Inputs {
-        columns: Tensor::zeros([1], shared.device()),
         albedo: planes(Input::Albedo, |at| &at.albedo),
         specular: planes(Input::Specular, |at| std::slice::from_ref(&at.specular)),
         attenuator: planes(Input::Attenuator, |at| std::slice::from_ref(&at.attenuator)),
         open: planes(Input::Open, |at| std::slice::from_ref(&at.occlusion)),
         bump: planes(Input::Bump, |at| &at.bump),
+        ..of_cubes(shared, cubes)
+    }
+}
+
+/// Inputs of these cubes and of nothing else.
+pub(super) fn of_cubes(shared: &SharedDevice, cubes: [Option<&Cube<f32>>; CUBES.len()]) -> Inputs {
+    let [irradiance, lobe, hilite, reflected, glossy] = cubes.map(|of| cube(shared, of));
+    Inputs {
+        columns: Tensor::zeros([1], shared.device()),
+        albedo: nothing(shared),
+        specular: nothing(shared),
+        attenuator: nothing(shared),
+        open: nothing(shared),
+        bump: nothing(shared),
         irradiance,
         lobe,
         hilite,

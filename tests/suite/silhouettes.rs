@@ -231,10 +231,13 @@ fn displaced_and_turned_cameras_are_noticed_on_path_traced_heads() {
             DMat4::from_rotation_x(-turn),
         ];
         for i in 0..loaded.scene.views.len() {
+            // The others take as long, and nothing is said of them.
+            let mut loaded = loaded.clone();
+            loaded.scene.views = vec![loaded.scene.views.swap_remove(i)];
             for motion in motions {
                 let mut pixels = [0.0; 2];
                 let told = said_with(&loaded, |scene| {
-                    pixels = moved(&mut scene.views[i].camera, motion, place);
+                    pixels = moved(&mut scene.views[0].camera, motion, place);
                 });
                 assert_eq!(told.len(), 1, "{scene}, view {i}, {motion}: {told:#?}");
                 // From aside by half a head the head is seen turned by 4 degrees, of which no shift is.
@@ -242,7 +245,7 @@ fn displaced_and_turned_cameras_are_noticed_on_path_traced_heads() {
             }
             let rolled = DMat4::from_rotation_z(5_f64.to_radians());
             let told = said_with(&loaded, |scene| {
-                moved(&mut scene.views[i].camera, rolled, place);
+                moved(&mut scene.views[0].camera, rolled, place);
             });
             assert!(told.len() == 1 && told[0].contains("no shift and no scale"), "{scene}, {i}: {told:#?}");
         }

@@ -1,6 +1,7 @@
 //! Light that comes through the skin (MODEL 11): the rules against the vectors of an independent float64 oracle, and what is
 //! found of thickness and of lights' ways inside, on meshes whose answer is known.
 
+use std::collections::HashMap;
 use std::f64::consts::PI;
 
 use glam::{DVec3, Vec2, Vec3, vec3};
@@ -17,7 +18,7 @@ use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
 use skinfit::model::evaluate::Setup;
 use skinfit::model::fields::{Field, Fields};
 use skinfit::model::params::{Column, Param, Params};
-use skinfit::model::transmission::{FARTHEST, Method};
+use skinfit::model::transmission::{FARTHEST, Method, NODES};
 use skinfit::prepare::Baked;
 use skinfit::render::image::Image;
 use skinfit::samples::PosedSurface;
@@ -28,6 +29,7 @@ use skinfit::scene::{Light, LightKind, Quality, Scene};
 use skinfit::shader::facts::FaceSizes;
 use skinfit::shader::tangent::chain::Seed;
 use skinfit::shader::{Facts, Source};
+use skinfit_core::export::vertices::fields_at_vertices;
 use skinfit_core::program::graph::Input;
 use skinfit_core::program::lower::Natives;
 use skinfit_core::program::shading::{Shading, constant};
@@ -38,7 +40,7 @@ use crate::common::vectors_light;
 use crate::fixtures::{bare_scene, camera, quantile};
 use crate::graphics::bench::{self, Difference, EXACT, gpu};
 use crate::scene_folder::{SCENE, SceneFolder};
-use crate::sky::{bakes, brighter, effect, gentle, head_with, image, on_cpu, scene, shape};
+use crate::sky::{bakes, brighter, effect, gentle, head_changed, image, on_cpu, scene, shape};
 use crate::slopes;
 use crate::vectors::reader::{Node, Tolerance, Vectors};
 
@@ -348,9 +350,10 @@ fn nothing_is_baked_that_is_not_asked_for() {
 }
 
 /// The built-in head, so small that light comes through it, in `pixels` pixels a side.
-fn head(pixels: u32) -> Baked {
+fn head_by(method: Method, pixels: u32) -> Baked {
     let more = [Effect::NormalMap, Effect::Lights, Effect::Shadows, effect("transmission")];
-    head_with(&more).with_scene(|scene| {
+    head_changed(&more, |scene| {
+        scene.choices.transmission.method = method;
         let camera = &mut scene.views[0].camera;
         (camera.width, camera.height) = (pixels, pixels);
         scene.metres_per_unit = 0.004;
@@ -359,16 +362,88 @@ fn head(pixels: u32) -> Baked {
     })
 }
 
+/// From within a slab all rays leave by the other side, those at an angle t after d / cos t: of light that is even over that side
+/// the share of exp(-d / (l cos t)), weighted by the cosine, comes through, which is 2 E_3(d / l).
+#[test]
+fn gathered_light_comes_through_a_slab_as_the_exponential_integral_says() {
+    let mut scene = lit_slab(beam("through_gathered", DVec3::Z), true);
+    scene.choices.transmission.method = Method::Gathered;
+    scene.quality.occlusion_rays = 256;
+    let names: Vec<&str> = scene.needs().fields.iter().map(Field::name).collect();
+    let own = ["light_through_gathered_far_light_0", "light_through_gathered_far_light_3"];
+    assert!(own.iter().all(|name| names.contains(name)), "{names:?}");
+    assert!(names.iter().all(|name| !name.ends_with("_depth") && *name != "thickness"), "{names:?}");
+    // 2 E_3, a sum over the square of the cosine.
+    let through = |depth: f64| -> f64 {
+        let steps = 20_000;
+        let at = |i: i32| ((f64::from(i) + 0.5) / f64::from(steps)).sqrt();
+        (0..steps).map(|i| (-depth / at(i)).exp() / f64::from(steps)).sum()
+    };
+    let image = image_of(&scene);
+    for (i, rgb) in image.rgb.iter().enumerate() {
+        for c in 0..3 {
+            let want = WEIGHT[c] * through(UNIT * THICK / LENGTH[c]) / PI;
+            // Of a cubic, as it says; of 256 stratified rays a hundredth.
+            let most = WEIGHT[c] * 0.005 / PI + 0.01 * want;
+            assert!((f64::from(rgb[c]) - want).abs() < most, "pixel {i}, channel {c}: {} {want}", rgb[c]);
+        }
+    }
+    // A light in front comes in nowhere.
+    let mut before = lit_slab(beam("through_gathered", DVec3::NEG_Z), true);
+    let own = image_of(&before.clone().without_transmission());
+    before.choices.transmission.method = Method::Gathered;
+    assert!(image_of(&before) == own);
+}
+
+/// What an exported mesh hands to a rasteriser is the sum that samples are shaded by.
+#[test]
+fn vertices_have_gathered_light_told_apart_and_weakened() {
+    let baked = head_by(Method::Gathered, 16);
+    let scene = &baked.scene;
+    let posed = scene.mesh.pose();
+    let rays = RayMesh::of(&posed);
+    let surface = PosedSurface::new(scene, &posed, &rays, &[], baked.surface_bakes()).unwrap();
+    let handed: HashMap<&str, Vec<f32>> =
+        fields_at_vertices(scene, &surface).into_iter().map(|(field, of)| (field.name(), of)).collect();
+    assert!(handed.keys().all(|name| !name.contains("far_light_")), "{:?}", handed.keys());
+    let fields = scene.needs().fields.iter().filter(|field| field.name().contains("far_light_"));
+    let held: HashMap<&str, Vec<f32>> =
+        fields.map(|field| (field.name(), surface.field_of_vertices(field))).collect();
+    let length = scene.params.rgb(param("transmission_length"));
+    let weakened = |c: usize, of: &dyn Fn(usize) -> f32| -> f64 {
+        NODES.iter().enumerate().map(|(k, node)| (-node / length[c]).exp() * f64::from(of(k))).sum()
+    };
+    let mut brightest = [0.0_f64; 2];
+    for (i, whole) in handed["far_light"].iter().enumerate() {
+        let sky = weakened(i % 3, &|k| held[format!("far_light_{k}").as_str()][i]);
+        let lamp =
+            weakened(i % 3, &|k| held[format!("light_side_far_light_{}", k / 3).as_str()][i / 3 * 3 + k % 3]);
+        // Sums of twelve in 32 bits, some of them below 0.
+        assert!((f64::from(*whole) - sky).abs() < 1e-5, "{i}: {whole} {sky}");
+        assert!((f64::from(handed["light_side_far_light"][i]) - lamp).abs() < 1e-5, "{i}: {lamp}");
+        brightest = [brightest[0].max(sky), brightest[1].max(lamp)];
+    }
+    assert!(brightest.iter().all(|light| *light > 0.01), "nothing comes through: {brightest:?}");
+}
+
 #[test]
 fn at_a_weight_of_0_an_image_is_what_it_is_without_the_effect() {
-    let with = head(24).with_scene(|scene| scene.params.set(param("transmission_weight"), 0.0));
-    let without = with.clone().with_scene(|scene| *scene = scene.clone().without_transmission());
-    assert!(on_cpu(&with) == on_cpu(&without));
+    for method in [Method::Thickness, Method::Gathered] {
+        let with =
+            head_by(method, 24).with_scene(|scene| scene.params.set(param("transmission_weight"), 0.0));
+        let without = with.clone().with_scene(|scene| *scene = scene.clone().without_transmission());
+        assert!(on_cpu(&with) == on_cpu(&without), "{method:?}");
+    }
 }
 
 #[test]
 fn slopes_are_finite_differences_on_every_engine() {
-    let baked = head(16);
+    for method in [Method::Thickness, Method::Gathered] {
+        slopes_of(head_by(method, 16));
+    }
+}
+
+fn slopes_of(baked: Baked) {
     let target = brighter(on_cpu(&baked));
     let baked = baked.with_scene(|scene| scene.views[0].target = Some(target));
     let mut columns = vec!["base_weight", "light.side.color", "environment_rotation"];
@@ -390,11 +465,11 @@ fn slopes_are_finite_differences_on_every_engine() {
 }
 
 #[test]
-fn the_renderer_draws_what_the_processor_does_by_vertices_and_by_shadow_maps() {
+fn the_renderer_draws_what_the_processor_does_by_every_method() {
     let Some(gpu) = gpu() else { return };
     let camera_of = |scene: &Scene| scene.views[0].camera;
     for method in Method::ALL {
-        let baked = head(32).with_scene(|scene| scene.choices.transmission.method = method);
+        let baked = head_by(method, 32);
         let want = on_cpu(&baked);
         let camera = camera_of(&baked.scene);
         let got = Renderer::new(gpu, Content::of(&baked), EXACT).unwrap().render(&camera, 1.0).unwrap().image;
@@ -417,6 +492,9 @@ fn the_table_is_read_and_what_it_lacks_is_told() {
         folder.load()
     };
     let table = "[transmission]\nmethod = \"shadow_maps\"\n";
+    let (scene, _) =
+        with("[transmission]\nmethod = \"gathered\"\n", "\"diffuse\", \"transmission\"").unwrap();
+    assert_eq!(scene.choices.transmission.method, Method::Gathered);
     let (scene, warnings) = with(table, "\"diffuse\", \"transmission\"").unwrap();
     assert_eq!(scene.choices.transmission.method, Method::ShadowMaps);
     assert_eq!(scene.params.scalar(param("transmission_unit")), 1000.0);

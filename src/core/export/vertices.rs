@@ -1,6 +1,7 @@
 //! What is baked of a scene's vertices, as streams of numbers: attributes of its mesh file.
 
 use crate::bake::VertexOcclusion;
+use crate::bake::inward::sum_of_nodes;
 use crate::bake::transfer::{TransferSet, VertexTransfer};
 use crate::model::fields::Field;
 use crate::samples::{PosedSurface, SurfaceBakes};
@@ -42,12 +43,19 @@ fn occlusion(of: &VertexOcclusion) -> VertexStream {
     VertexStream { name: "OCCLUSION".to_owned(), kind: StreamKind::Scalar, numbers, morphs }
 }
 
-/// The fields of a scene's effects that rays, or the mesh file, have at vertices.
+/// The fields of a scene's effects that rays, or the mesh file, have at vertices, as a rasteriser takes them: of light that is
+/// gathered inside the mesh the sum over distances.
 #[must_use]
 pub fn fields_at_vertices(scene: &Scene, surface: &PosedSurface<'_>) -> Vec<(Field, Vec<f32>)> {
     let at_vertices = |field: &Field| field.map().is_none() && surface.finds_at_vertices(*field);
-    let fields = scene.needs().fields.iter();
-    fields.filter(at_vertices).map(|field| (field, surface.field_of_vertices(field))).collect()
+    let mut fields: Vec<Field> = Vec::new();
+    for field in scene.needs().fields.iter().filter(at_vertices) {
+        let taken = sum_of_nodes(field.name()).and_then(Field::from_name).unwrap_or(field);
+        if !fields.contains(&taken) {
+            fields.push(taken);
+        }
+    }
+    fields.into_iter().map(|field| (field, surface.field_of_vertices(field))).collect()
 }
 
 fn fields(scene: &Scene, surface: &PosedSurface<'_>) -> Vec<VertexStream> {

@@ -227,7 +227,7 @@ impl Facts {
     }
 
     /// Conditions of a rule's `when` line that are neither effects nor forms.
-    pub const CONDITIONS: [&'static str; 36] = [
+    pub const CONDITIONS: [&'static str; 37] = [
         "layered",
         "lights_bounce",
         "traced_lobe",
@@ -264,6 +264,7 @@ impl Facts {
         "shadow_pcf",
         "shadow_pcss",
         "translucent_maps",
+        "gathered_through",
     ];
 
     /// Whether a condition of a rule's `when` line holds; `None` for one that is not known.
@@ -286,6 +287,7 @@ impl Facts {
         Some(match condition {
             "layered" => setup.effects.share_light(),
             "lights_bounce" => gathers(&setup),
+            "gathered_through" => self.gathers_through(),
             "raster" => self.source == Source::Raster,
             "traced_lobe" => self.traces_lobes(),
             "turning_sky" => self.turns_sky(),
@@ -349,6 +351,11 @@ impl Facts {
     fn maps_depth(&self) -> bool {
         let wanted = self.setup.choices.transmission.method == transmission::Method::ShadowMaps;
         wanted && self.source == Source::Raster && self.shadow_filter().is_some()
+    }
+
+    /// Whether what comes through is gathered by rays inward.
+    fn gathers_through(&self) -> bool {
+        self.setup.choices.transmission.method == transmission::Method::Gathered
     }
 
     /// Whether what vertices found of the sky moves as a fit turns it. A rasteriser has it found anew.

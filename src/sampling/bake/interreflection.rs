@@ -221,7 +221,7 @@ fn plain_key(key: Key, plain: &PlainParts) -> Key {
 }
 
 /// How much each corner counts where a ray meets a triangle; none where rounding leaves no area.
-fn weights(origin: Vec3A, d: Vec3A, corners: [Vec3A; 3]) -> Option<[f32; 3]> {
+pub(super) fn weights(origin: Vec3A, d: Vec3A, corners: [Vec3A; 3]) -> Option<[f32; 3]> {
     let [a, b, c] = corners.map(|corner| corner - origin);
     let parts = [b.cross(c), c.cross(a), a.cross(b)].map(|edge| d.dot(edge));
     let whole = parts[0] + parts[1] + parts[2];

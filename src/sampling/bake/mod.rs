@@ -12,7 +12,7 @@
 //! - [`harmonics`]: spherical harmonics; [`coefficients`]: the environment's light by them
 //! - [`transfer`]: which of that light arrives at each vertex, past the mesh ([`interreflection`]: and by way of it);
 //!   [`shadowed`]: how much; [`sky`]: which of both a scene asks for
-//! - [`thickness`]: how far below each vertex the mesh's far side lies
+//! - [`thickness`]: how far below each vertex the mesh's far side lies; [`inward`]: the light that arrives there
 //! - [`rays`]: the mesh as rays see it; `wide_bvh`: as many rays do, `packet` by packet; `cutouts`: where they go through
 //! - `between`: bakes of poses between two
 //! - [`cache`]: bakes kept between runs (`baker`: each bake through it; `gather_cache`: what vertices gather of one another)
@@ -25,6 +25,7 @@ mod cutouts;
 mod gather_cache;
 pub mod harmonics;
 pub mod interreflection;
+pub mod inward;
 mod lobe_kernel;
 pub mod lobe_sky;
 pub mod lobes;

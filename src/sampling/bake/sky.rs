@@ -7,9 +7,11 @@ use super::baker::Baker;
 use super::coefficients::Coefficients;
 use super::harmonics::Order;
 use super::interreflection::Albedo;
+use super::inward::gathers_inside;
 use super::transfer::VertexTransfer;
 use super::{all_sets, all_weights};
 use crate::model::choices::{Bounces, SpecularVisibility, Visibility};
+use crate::model::effects::Effect;
 use crate::model::fields::Fields;
 use crate::scene::Scene;
 use crate::scene::maps::Environment;
@@ -81,11 +83,13 @@ impl Wanted {
     pub fn of(scene: &Scene) -> Option<Self> {
         let fields = scene.needs().fields;
         let wanted = |name| fields.named(name).is_some();
+        // Of the environment's light at the far side.
+        let through = gathers_inside(scene) && scene.effects.has(Effect::Diffuse);
         if !wanted(SKY_RATIO) {
             // The skin's own light is as smooth as what it throws back.
-            let skin = sees_skin(scene, fields);
-            let order = if skin { Order::FOUR } else { Order::LEAST };
-            return (skin || wanted(BENT_NORMAL)).then_some(Self { order, bounces: false, light: skin });
+            let light = through || sees_skin(scene, fields);
+            let order = if light { Order::FOUR } else { Order::LEAST };
+            return (light || wanted(BENT_NORMAL)).then_some(Self { order, bounces: false, light });
         }
         let choices = scene.choices;
         let gathered = choices.bounces == Bounces::Gathered;
@@ -93,7 +97,7 @@ impl Wanted {
             // Rays meet places whose light is known by as many bands as there are.
             Visibility::Rays if gathered => Order::MOST,
             // What is thrown back is smooth.
-            Visibility::Scalar | Visibility::Cone if gathered => Order::FOUR,
+            Visibility::Scalar | Visibility::Cone | Visibility::Rays if gathered || through => Order::FOUR,
             visibility => visibility.bands().and_then(Order::new).unwrap_or(Order::LEAST),
         };
         // Rays gather by themselves.

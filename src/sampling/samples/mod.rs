@@ -11,7 +11,8 @@
 //!   them of lights, `bounced`: what the skin throws back of these, `sky`: what they see of the sky, `sky_rays`: by
 //!   rays; `lit_mesh`: the mesh as a source of light, `skin`: what it sees of itself; `surface`: frames, silhouette and
 //!   maps at a hit; `footprint`: how much of a map a sample covers; `lobe`: rays into a specular lobe there,
-//!   `lobe_light`: the light that they bring; `through`: what comes through the mesh
+//!   `lobe_light`: the light that they bring; `through`: what comes through the mesh, `far_light`: as
+//!   rays inside gather it
 //! - `group`: samples packed into groups
 //! - `plain`: what is not skin, as pictures show it; [`plain_spread`]: what reaches places on it, for a rasteriser
 //! - [`covered`]: the same groups of samples that a rasteriser found
@@ -29,6 +30,7 @@ pub mod atlas;
 mod bounced;
 pub mod covered;
 mod dilation;
+mod far_light;
 mod footprint;
 mod group;
 mod lit;
@@ -373,6 +375,18 @@ fn of_skin(
     let surface = surface::Surface::new(scene, posed, camera);
     let samples = group::pack(&hits, &surface, (camera.width, n * n), done);
     (samples, hits.plain)
+}
+
+/// The place of the mesh that a ray through each pixel shows, skin or not; `None` beside it.
+#[must_use]
+pub fn pixel_places(posed: &PosedSurface<'_>, camera: &Camera) -> Vec<Option<Vec3>> {
+    let hits = trace::trace(posed.rays, posed.mesh, camera, 1);
+    let mut places = vec![None; camera.width as usize * camera.height as usize];
+    let skin = hits.pixels.iter().map(|(pixel, of)| (*pixel, hits.hits[of.start as usize]));
+    for (pixel, hit) in skin.chain(hits.plain.iter().copied()) {
+        places[pixel as usize] = Some(hit.place(posed.mesh));
+    }
+    places
 }
 
 /// `count` records of what the effects of `scene` ask for, all zero.

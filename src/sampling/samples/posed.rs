@@ -13,7 +13,7 @@ use super::sky::Sky;
 use super::supply::{Points, Supplies, put_each};
 use super::surface::NORMAL_SPREAD;
 use super::trace::Hit;
-use super::{SampleError, bounced, lit, posed_occlusion, sky, through};
+use super::{SampleError, bounced, far_light, lit, posed_occlusion, sky, through};
 use crate::bake::interreflection::VertexGather;
 use crate::bake::lobe_sky::LobeSky;
 use crate::bake::rays::RayMesh;
@@ -120,8 +120,9 @@ impl<'a> PosedSurface<'a> {
         supplies.extend(bounced::supplies(scene, mesh, rays, gather, fields));
         supplies.extend(through::supplies(scene, mesh, rays, morphs, (bakes.thickness, fields))?);
         let mut lit = None;
-        if let Some(bake) = bakes.sky {
-            let sky = Sky::new(scene, mesh, morphs, bake)?;
+        let sky = bakes.sky.map(|bake| Sky::new(scene, mesh, morphs, bake)).transpose()?;
+        supplies.extend(far_light::supplies(scene, mesh, rays, sky.as_ref(), fields));
+        if let Some((sky, bake)) = sky.zip(bakes.sky) {
             supplies.extend(sky::supplies(scene, rays, &sky, (bake, gather), fields));
             let gather = gather.filter(|_| sees_skin(scene, fields));
             let skin = gather.map(|gather| Skin::new(scene, mesh, rays, &sky, gather));

@@ -1,7 +1,7 @@
 //! Primary rays: which point of the mesh each stratified sample of each pixel sees. Those of a pinhole that end at the first
 //! surface find it triangle by triangle (`raster`), the others by a hierarchy.
 
-use glam::{DVec3, Vec2, Vec3A};
+use glam::{DVec3, Vec2, Vec3, Vec3A};
 use rayon::prelude::*;
 
 use super::raster::{Raster, Scratch};
@@ -37,6 +37,12 @@ impl Hit {
     /// Those by which the mesh lies in the UV atlas.
     pub(super) fn atlas_uv(&self, mesh: &PosedMesh) -> Vec2 {
         self.mean(mesh, mesh.atlas_uvs())
+    }
+
+    /// Where the mesh is there.
+    pub(super) fn place(&self, mesh: &PosedMesh) -> Vec3 {
+        let corners = mesh.triangles[self.triangle as usize];
+        self.weights().into_iter().zip(corners).map(|(weight, i)| weight * mesh.positions[i as usize]).sum()
     }
 
     fn mean(&self, mesh: &PosedMesh, uvs: &[Vec2]) -> Vec2 {

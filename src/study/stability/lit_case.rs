@@ -24,7 +24,7 @@ use crate::model::evaluate::Setup;
 use crate::model::fields::Fields;
 use crate::model::fragment::Fragment;
 use crate::model::params::{Param, Params};
-use crate::model::transmission::FARTHEST;
+use crate::model::transmission::{FARTHEST, Method, TransmissionChoices};
 use crate::model::vector::dot;
 use crate::samples::surface_records::{Asked, Unmade};
 use crate::samples::{Atlas, LANES, SurfaceRecords};
@@ -246,6 +246,7 @@ fn setup(probes: &Probes, rng: &mut StdRng) -> Setup {
         normal_filter: one_of(rng, &NormalFilter::ALL),
         bounces: one_of(rng, &Bounces::ALL),
         skin_reflection: one_of(rng, &SkinReflection::ALL),
+        transmission: TransmissionChoices { method: one_of(rng, &Method::ALL) },
         // What may be free is.
         glossy: true,
         turning: rng.random(),

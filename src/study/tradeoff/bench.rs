@@ -8,6 +8,7 @@ use std::time::Instant;
 
 use super::settings::{Settings, Traced};
 use crate::StudyError;
+use crate::bake::inward::gathers_inside;
 use crate::bake::rays::RayMesh;
 use crate::bake::{self, Illumination, Ranges};
 use crate::engine::cpu::CpuEngine;
@@ -275,8 +276,8 @@ impl<'a> Bench<'a> {
         // These go first: there is no need of both.
         self.last.replace(None);
         let occluded = settings.is_but_for_occlusion(own);
-        // What is found of the sky follows from the same rays.
-        let occluded = occluded && bakes.sky.is_none();
+        // What is found of the sky, and inside the mesh, follows from as many rays.
+        let occluded = occluded && bakes.sky.is_none() && !gathers_inside(scene);
         let made = if occluded { self.occluded(scene, bakes)? } else { traced(scene, bakes)? };
         let surfaces = Arc::new(made);
         self.last.replace(Some((settings, Arc::clone(&surfaces))));

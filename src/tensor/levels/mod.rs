@@ -20,7 +20,7 @@ pub(super) use self::stage::HELD;
 use self::stage::LevelStage;
 use super::inputs::{Input, Inputs};
 use super::operation::{self, Operation};
-use super::shade::{Cubes, columns, cube, matrix, nothing};
+use super::shade::{Cubes, columns, matrix, nothing, of_cubes};
 use super::shaded::{Scatter, Shaded};
 use super::{SharedDevice, TensorError};
 use crate::model::diffusion::{DiffusionChoices, Method, Seams};
@@ -154,19 +154,12 @@ fn inputs(shared: &SharedDevice, stage: &LevelStage, shaded: &Shaded<'_>, cubes:
         Some(numbers) => matrix(shared, numbers, [stage.texels(), input.width().unwrap_or(1)]),
         None => nothing(shared),
     };
-    let [irradiance, lobe, hilite, reflected, glossy] = cubes.each().map(|of| cube(shared, of));
     Inputs {
         columns: columns(shared, shaded),
         albedo: texels(Input::Albedo),
         specular: texels(Input::Specular),
         attenuator: texels(Input::Attenuator),
         open: texels(Input::Open),
-        bump: nothing(shared),
-        irradiance,
-        lobe,
-        hilite,
-        reflected,
-        glossy,
-        levels: nothing(shared),
+        ..of_cubes(shared, cubes.each())
     }
 }

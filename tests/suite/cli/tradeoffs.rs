@@ -283,7 +283,8 @@ fn what_makes_no_sense_is_refused() {
 #[test]
 fn ways_to_the_skys_light_are_measured_beside_rays() {
     let sandbox = Sandbox::new();
-    sandbox.edit("\"reflection\"]", "\"reflection\", \"fresnel\", \"directional_occlusion\"]");
+    sandbox
+        .edit("\"reflection\"]", "\"reflection\", \"fresnel\", \"directional_occlusion\", \"transmission\"]");
     sandbox.edit("occlusion_rays = 32", "occlusion_rays = 256\nlobe_rays = 32");
     let ways = [
         ("visibility", "rays", "sh4"),
@@ -292,6 +293,7 @@ fn ways_to_the_skys_light_are_measured_beside_rays() {
         ("lobe_lookup", "rays", "mirror"),
         ("skin_reflection", "rays", "gathered"),
         ("bounces", "gathered", "gathered"),
+        ("transmission", "gathered", "thickness"),
     ];
     let axes = ways.iter().flat_map(|(axis, ..)| ["--axis", axis]);
     done(sandbox.run(&["tradeoff", "scene.toml", "-o", "cost"].into_iter().chain(axes).collect::<Vec<_>>()));

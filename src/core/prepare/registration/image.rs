@@ -43,6 +43,11 @@ impl Picture {
         })
     }
 
+    /// What a pixel counts.
+    pub(super) fn weight(&self, i: usize) -> f64 {
+        f64::from(self.mask.get(i).copied().unwrap_or(1.0))
+    }
+
     /// The means of squares of `side` pixels; what is left at the right and below is cut off.
     pub(super) fn reduced(&self, side: usize) -> Self {
         let (width, height) = ((self.width / side).max(1), (self.height / side).max(1));

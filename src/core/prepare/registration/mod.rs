@@ -2,31 +2,34 @@
 //!
 //! Each view's camera has seven unknowns: a turn about the mesh's middle, a shift, and the focal length. They are found by
 //! Gauss and Newton's steps (Levenberg's, damped) on what a drawn image and the target differ by, at a reduced size first.
-//! Derivatives are differences of images drawn most of a pixel to either side, so that what comes and goes at silhouettes counts.
+//! Derivatives are those of Lucas and Kanade: what is seen moves with the mesh, silhouettes and colours alike.
 //!
 //! - `image`: images at a reduced size, with their cameras
 //! - `residual`: what a drawn image and a target differ by
+//! - `motion`: how what is seen moves; `gradients`: and so what is compared
 //! - `unknowns`: a camera and its seven unknowns, in pixels
 //! - `solve`: the steps
 
+mod gradients;
 mod image;
+mod motion;
 mod residual;
 mod solve;
 mod unknowns;
 
 use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::{Baked, PrepareError};
 use crate::bake::rays::RayMesh;
 use crate::progress;
 use crate::render::shade::Shader;
-use crate::samples::{self, PosedSurface};
-use crate::scene::digits;
+use crate::samples::{self, Atlas, PosedSurface};
 use crate::scene::mesh::PosedMesh;
 use crate::scene::view::{Camera, View};
+use crate::scene::{Scene, digits};
 
 use image::Picture;
 use residual::Colors;
@@ -65,21 +68,13 @@ pub(super) fn register(baked: &mut Baked) -> Result<Vec<MovedCamera>, PrepareErr
     let atlas = samples::atlas_of(&scene, &surface)?;
     let shader = Shader::new(baked.setup(), &baked.illumination, &scene.params)
         .map_err(|error| PrepareError::Shading { scene: scene.path.display().to_string(), error })?;
-    let draw = |camera: &Camera| {
-        let mut seen = samples::sample_silhouettes(&scene, &surface, camera);
-        if seen.pixel.is_empty() && seen.plain.is_empty() {
-            return None;
-        }
-        seen.atlas.clone_from(&atlas);
-        Some(Picture::of(shader.shade(&seen, camera, 1.0)))
-    };
+    let model = Model { scene: &scene, surface, atlas, shader, mesh: &posed };
     let wanted: Vec<usize> = (0..scene.views.len()).filter(|&i| scene.views[i].target.is_some()).collect();
     let bar = progress::bar("cameras", wanted.len() as u64);
     let mut moved = Vec::new();
     for i in wanted {
         let view = &scene.views[i];
-        let (camera, settled) =
-            one(view, &posed, &draw).ok_or_else(|| samples::nothing_visible(&scene, view))?;
+        let (camera, settled) = one(view, &model).ok_or_else(|| samples::nothing_visible(&scene, view))?;
         let pixels = displacement(&posed, &view.camera, &camera);
         moved.push(MovedCamera {
             view: view.name.clone(),
@@ -91,7 +86,7 @@ pub(super) fn register(baked: &mut Baked) -> Result<Vec<MovedCamera>, PrepareErr
         bar.inc(1);
     }
     bar.finish_and_clear();
-    drop(surface);
+    drop(model);
     let scene = Arc::make_mut(&mut baked.scene);
     for camera in &moved {
         let of_view = scene.views.iter_mut().filter(|view| view.name == camera.view);
@@ -100,18 +95,40 @@ pub(super) fn register(baked: &mut Baked) -> Result<Vec<MovedCamera>, PrepareErr
     Ok(moved)
 }
 
+/// What cameras see.
+struct Model<'a> {
+    scene: &'a Scene,
+    surface: PosedSurface<'a>,
+    atlas: Option<Arc<Atlas>>,
+    shader: Shader,
+    mesh: &'a PosedMesh,
+}
+
+impl Model<'_> {
+    /// The image; `None` where nothing of the mesh is in it.
+    fn draw(&self, camera: &Camera) -> Option<Picture> {
+        let mut seen = samples::sample_silhouettes(self.scene, &self.surface, camera);
+        if seen.pixel.is_empty() && seen.plain.is_empty() {
+            return None;
+        }
+        seen.atlas.clone_from(&self.atlas);
+        Some(Picture::of(self.shader.shade(&seen, camera, 1.0)))
+    }
+
+    /// The place that each pixel shows.
+    fn places(&self, camera: &Camera) -> Vec<Option<Vec3>> {
+        samples::pixel_places(&self.surface, camera)
+    }
+}
+
 /// The camera of one view, from coarse images to fine ones; `None` where it sees nothing.
-fn one(
-    view: &View,
-    mesh: &PosedMesh,
-    draw: &(impl Fn(&Camera) -> Option<Picture> + Sync),
-) -> Option<(Camera, bool)> {
+fn one(view: &View, model: &Model<'_>) -> Option<(Camera, bool)> {
     let target = Picture::of_target(view)?;
     let longest = view.camera.width.max(view.camera.height);
     let least = longest.div_ceil(FINEST).max(1);
     let mut side = longest.div_ceil(COARSEST).max(least);
     let at = |camera: &Camera, side: u32, colors: Colors| {
-        solve::register(camera, mesh, &target.reduced(side as usize), (side, colors), draw)
+        solve::register(camera, &target.reduced(side as usize), (side, colors), model)
     };
     let mut camera = at(&view.camera, side, Colors::Whole)?.camera;
     while side / 2 > least {

@@ -42,18 +42,27 @@ pub(super) struct Weights {
     color: f64,
 }
 
-/// The differences of an image and a target; 0 where nothing is compared.
+/// The differences of an image and a target, or how they move; 0 where nothing is compared.
+#[derive(Clone, Debug)]
+pub(super) struct Differences {
+    /// Of the coverage of each pixel.
+    pub(super) cover: Vec<f64>,
+    /// Of the colours of each pixel, and whether they are compared.
+    pub(super) color: Vec<Option<[f64; 3]>>,
+}
+
+/// What a drawn image and a target differ by.
 #[derive(Clone, Debug)]
 pub(super) struct Residual {
-    /// Of the coverage of each pixel.
-    cover: Vec<f64>,
-    /// Of the colours of each pixel, and whether they are compared.
-    color: Vec<Option<[f64; 3]>>,
+    pub(super) differences: Differences,
+    /// What takes each channel of the drawn layers to the target's.
+    pub(super) fitted: Vec<Fitted>,
+    pub(super) colors: Colors,
 }
 
 impl Residual {
     pub(super) fn new(drawn: &Picture, target: &Picture, colors: Colors) -> Self {
-        let weight = |i: usize| f64::from(target.mask.get(i).copied().unwrap_or(1.0));
+        let weight = |i: usize| target.weight(i);
         let covered = |picture: &Picture, i: usize| picture.alpha.as_ref().map_or(1.0, |alpha| alpha[i]);
         let count = target.width * target.height;
         let cover = match &target.alpha {
@@ -72,13 +81,12 @@ impl Residual {
         let color = |i: usize| {
             compared[i].then(|| std::array::from_fn(|c| fitted[c].difference(drawn, target, i, c)))
         };
-        let color: Vec<Option<[f64; 3]>> = (0..count).map(color).collect();
-        match colors {
-            Colors::Whole => Self { cover, color },
-            Colors::Detail => Self { cover, color: detail(&color, target.width) },
-        }
+        let color: Vec<Option<[f64; 3]>> = (0..count).into_par_iter().map(color).collect();
+        Self { differences: Differences { cover, color: colors.of(color, target.width) }, fitted, colors }
     }
+}
 
+impl Differences {
     /// The weights by which these differences are as large as each other.
     pub(super) fn weights(&self) -> Weights {
         let edges = self.cover.iter().filter(|d| **d != 0.0);
@@ -115,15 +123,15 @@ impl Residual {
             [weights.cover * cover, weights.color * r, weights.color * g, weights.color * b]
         })
     }
+}
 
-    /// Half the difference of two others, where both are compared: how this one changes a step.
-    pub(super) fn slope(ahead: &Self, behind: &Self, step: f64) -> Self {
-        let cover = ahead.cover.iter().zip(&behind.cover).map(|(a, b)| (a - b) / (2.0 * step)).collect();
-        let color = ahead.color.iter().zip(&behind.color).map(|(a, b)| match (a, b) {
-            (Some(a), Some(b)) => Some(std::array::from_fn(|c| (a[c] - b[c]) / (2.0 * step))),
-            _ => None,
-        });
-        Self { cover, color: color.collect() }
+impl Colors {
+    /// What is compared of the colours of an image of this width.
+    pub(super) fn of(self, color: Vec<Option<[f64; 3]>>, width: usize) -> Vec<Option<[f64; 3]>> {
+        match self {
+            Self::Whole => color,
+            Self::Detail => detail(&color, width),
+        }
     }
 }
 
@@ -153,12 +161,12 @@ fn detail(color: &[Option<[f64; 3]>], width: usize) -> Vec<Option<[f64; 3]>> {
 
 /// What takes a channel of the drawn layers nearest to the target's; differences are in standard deviations of the target's.
 #[derive(Clone, Debug)]
-struct Fitted {
+pub(super) struct Fitted {
     /// What each layer counts, none less than nothing.
     weights: Vec<f64>,
     constant: f64,
     /// One over the target's standard deviation; 0 where it has none.
-    scale: f64,
+    pub(super) scale: f64,
 }
 
 impl Fitted {
@@ -190,9 +198,14 @@ impl Fitted {
     }
 
     fn difference(&self, drawn: &Picture, target: &Picture, i: usize, channel: usize) -> f64 {
-        let layers = self.weights.iter().zip(&drawn.layers);
-        let made: f64 = layers.map(|(weight, layer)| weight * f64::from(layer[i][channel])).sum();
+        let made = self.made(drawn, i, channel);
         self.scale * (made + self.constant - f64::from(target.layers[0][i][channel]))
+    }
+
+    /// What the layers make of a pixel, but for the constant.
+    pub(super) fn made(&self, drawn: &Picture, i: usize, channel: usize) -> f64 {
+        let layers = self.weights.iter().zip(&drawn.layers);
+        layers.map(|(weight, layer)| weight * f64::from(layer[i][channel])).sum()
     }
 }
 
@@ -254,7 +267,7 @@ mod tests {
         };
         let residual = Residual::new(&picture(layers), &picture(vec![target]), Colors::Whole);
         // Shares of the target's deviation: sums of 64 products in f64, of a well-conditioned system.
-        assert!(residual.color.iter().all(|d| d.unwrap().iter().all(|d| d.abs() < 1e-11)));
+        assert!(residual.differences.color.iter().all(|d| d.unwrap().iter().all(|d| d.abs() < 1e-11)));
     }
 
     #[test]
@@ -272,7 +285,10 @@ mod tests {
         for target in [[[0.0; 3]; 2], [[0.4; 3]; 2], [[0.1; 3], [0.7; 3]]] {
             let residual = Residual::new(&drawn, &picture(vec![target.to_vec()]), Colors::Whole);
             // Two values lie on a line; what has no deviation differs by none.
-            assert!(residual.color.iter().all(|d| d.unwrap().iter().all(|d| d.abs() < 1e-6)), "{target:?}");
+            assert!(
+                residual.differences.color.iter().all(|d| d.unwrap().iter().all(|d| d.abs() < 1e-6)),
+                "{target:?}"
+            );
         }
     }
 

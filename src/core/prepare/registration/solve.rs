@@ -3,24 +3,23 @@
 use nalgebra::{SMatrix, SVector};
 use rayon::prelude::*;
 
+use super::Model;
+use super::gradients::Gradients;
 use super::image::{Picture, reduced_camera};
-use super::residual::{Colors, Residual, Weights};
+use super::motion::Motion;
+use super::residual::{Colors, Differences, Residual, Weights};
 use super::unknowns::{ALONG, COUNT, FOCAL, Pixels};
-use crate::scene::mesh::PosedMesh;
 use crate::scene::view::Camera;
 
-/// To either side of a camera, in pixels, where images are drawn for its derivatives: nearer, what a border covers does
-/// not change in most of its pixels.
-const STEP: f64 = 0.75;
 /// The most steps at one size.
-const MOST: usize = 12;
+const MOST: usize = 24;
 /// A step that moves no unknown by more pixels is the last.
 const SETTLED: f64 = 0.01;
 /// And one further than this is cut short: beyond, images are no lines of the unknowns.
 const FARTHEST: f64 = 4.0;
 /// Steps that are taken by their slopes alone, once none lowers the loss: coverage counts whole samples, so that near its
 /// minimum the loss is rougher than it is curved, while slopes over some pixels are means over thousands of borders.
-const POLISHING: usize = 4;
+const POLISHING: usize = 12;
 /// The loss may rise by this share of it in them.
 const ROUGHNESS: f64 = 0.01;
 /// The damping that is begun with, as a share of each unknown's curvature, and beyond which nothing is tried.
@@ -40,114 +39,124 @@ pub(super) struct Found {
     pub(super) settled: bool,
 }
 
+/// A drawn image, and what it and the target differ by.
+struct Compared {
+    camera: Camera,
+    drawn: Picture,
+    residual: Residual,
+}
+
+/// What cameras are compared by, at one size.
+struct Comparison<'a> {
+    model: &'a Model<'a>,
+    target: &'a Picture,
+    side: u32,
+    colors: Colors,
+}
+
+impl Comparison<'_> {
+    /// `None` where the camera sees nothing of the mesh.
+    fn of(&self, camera: Camera) -> Option<Compared> {
+        let drawn = self.model.draw(&reduced_camera(&camera, self.side))?;
+        let residual = Residual::new(&drawn, self.target, self.colors);
+        Some(Compared { camera, drawn, residual })
+    }
+
+    /// The unknowns of a camera in pixels of this size.
+    fn pixels(&self, camera: &Camera) -> Option<Pixels> {
+        Pixels::new(&reduced_camera(camera, self.side), self.model.mesh)
+    }
+
+    /// The curvature and the gradient of the loss, by how what is seen moves.
+    fn normal_equations(&self, here: &Compared, pixels: &Pixels, weights: Weights) -> (Curvature, Gradient) {
+        let camera = reduced_camera(&here.camera, self.side);
+        let motion = Motion::new(&camera, &self.model.places(&camera), pixels);
+        let gradients = Gradients::new(&here.residual, &here.drawn, self.target);
+        let weighted = |of: &Differences| of.weighted(weights).collect::<Vec<[f64; 4]>>();
+        let column = |unknown: usize| weighted(&gradients.along(|i| motion.at(i, unknown)));
+        let columns: Vec<Vec<[f64; 4]>> = (0..COUNT).into_par_iter().map(column).collect();
+        let own = weighted(&here.residual.differences);
+        let product = |a: &[[f64; 4]], b: &[[f64; 4]]| -> f64 {
+            a.iter().zip(b).map(|(a, b)| (0..4).map(|k| a[k] * b[k]).sum::<f64>()).sum()
+        };
+        let curvature = Curvature::from_fn(|i, j| product(&columns[i.min(j)], &columns[i.max(j)]));
+        let gradient = Gradient::from_fn(|i, _| product(&columns[i], &own));
+        (curvature, gradient)
+    }
+}
+
 /// The camera near `start` whose image is nearest to `target`, whose pixels are squares of `side` of the camera's; `None`
 /// where it sees nothing of the mesh.
 pub(super) fn register(
     start: &Camera,
-    mesh: &PosedMesh,
     target: &Picture,
     (side, colors): (u32, Colors),
-    draw: &(impl Fn(&Camera) -> Option<Picture> + Sync),
+    model: &Model<'_>,
 ) -> Option<Found> {
-    let residual = |camera: &Camera| {
-        draw(&reduced_camera(camera, side)).map(|drawn| Residual::new(&drawn, target, colors))
-    };
-    let mut camera = *start;
-    let mut here = residual(&camera)?;
+    let comparison = Comparison { model, target, side, colors };
+    let mut here = comparison.of(*start)?;
     let mut damping = DAMPING;
     let mut settled = false;
     for _ in 0..MOST {
-        let weights = here.weights();
-        // Steps are in pixels of this size.
-        let Some(pixels) = Pixels::new(&reduced_camera(&camera, side), mesh) else { break };
-        let (curvature, gradient) =
-            normal_equations(&here, weights, &|by| residual(&pixels.moved(&camera, by)));
-        let share = here.share();
-        let before = here.loss(weights, share);
+        let Some(pixels) = comparison.pixels(&here.camera) else { break };
+        let differences = &here.residual.differences;
+        let (weights, share) = (differences.weights(), differences.share());
+        let (curvature, gradient) = comparison.normal_equations(&here, &pixels, weights);
+        let before = differences.loss(weights, share);
         let mut moved = None;
         while damping <= MOST_DAMPING {
             let Some(by) = step(&curvature, &gradient, damping) else { break };
-            let trial = pixels.moved(&camera, &by);
-            let reached = residual(&trial).map(|there| (there.loss(weights, share), there));
-            if let Some((_, there)) = reached.filter(|(loss, _)| *loss < before) {
-                moved = Some((by, trial, there));
+            let lower = |there: &Compared| there.residual.differences.loss(weights, share) < before;
+            if let Some(there) = comparison.of(pixels.moved(&here.camera, &by)).filter(lower) {
+                moved = Some((by, there));
                 damping = (0.1 * damping).max(1e-9);
                 break;
             }
             damping *= 10.0;
         }
-        let Some((by, trial, there)) = moved else {
+        let Some((by, there)) = moved else {
             settled = damping > MOST_DAMPING;
             break;
         };
-        (camera, here) = (trial, there);
-        settled = by.iter().all(|pixels| pixels.abs() < SETTLED);
+        here = there;
+        settled = longest(&by) < SETTLED;
         if settled {
             break;
         }
     }
     if settled {
-        camera = polished(camera, here, mesh, side, &residual);
+        here = polished(here, &comparison);
     }
-    Some(Found { camera, settled })
+    Some(Found { camera: here.camera, settled })
 }
 
 /// The camera after some steps by slopes alone, for as long as they shrink.
-fn polished(
-    start: Camera,
-    residual_there: Residual,
-    mesh: &PosedMesh,
-    side: u32,
-    residual: &(impl Fn(&Camera) -> Option<Residual> + Sync),
-) -> Camera {
-    let (mut camera, mut here, mut last) = (start, residual_there, f64::INFINITY);
-    let (weights, share) = (here.weights(), here.share());
-    let bound = (1.0 + ROUGHNESS) * here.loss(weights, share);
+fn polished(start: Compared, comparison: &Comparison<'_>) -> Compared {
+    let (mut here, mut last) = (start, f64::INFINITY);
+    let differences = &here.residual.differences;
+    let (weights, share) = (differences.weights(), differences.share());
+    let bound = (1.0 + ROUGHNESS) * differences.loss(weights, share);
     for _ in 0..POLISHING {
-        let Some(pixels) = Pixels::new(&reduced_camera(&camera, side), mesh) else { break };
-        let (curvature, gradient) =
-            normal_equations(&here, weights, &|by| residual(&pixels.moved(&camera, by)));
+        let Some(pixels) = comparison.pixels(&here.camera) else { break };
+        let (curvature, gradient) = comparison.normal_equations(&here, &pixels, weights);
         let Some(by) = step(&curvature, &gradient, DAMPING) else { break };
-        let length = by.iter().fold(0.0_f64, |most, pixels| most.max(pixels.abs()));
-        let trial = pixels.moved(&camera, &by);
-        let Some(there) = residual(&trial).filter(|there| there.loss(weights, share) <= bound) else { break };
+        let near = |there: &Compared| there.residual.differences.loss(weights, share) <= bound;
+        let Some(there) = comparison.of(pixels.moved(&here.camera, &by)).filter(near) else { break };
+        let length = longest(&by);
         if length >= last {
             break;
         }
-        (camera, here, last) = (trial, there, length);
+        (here, last) = (there, length);
         if length < SETTLED {
             break;
         }
     }
-    camera
+    here
 }
 
-/// The curvature and the gradient of the loss, by differences of images.
-fn normal_equations(
-    here: &Residual,
-    weights: Weights,
-    residual: &(impl Fn(&[f64; COUNT]) -> Option<Residual> + Sync),
-) -> (Curvature, Gradient) {
-    let slope = |unknown: usize| {
-        let at = |pixels: f64| {
-            let mut by = [0.0; COUNT];
-            by[unknown] = pixels;
-            residual(&by)
-        };
-        let (ahead, behind) = (at(STEP)?, at(-STEP)?);
-        Some(Residual::slope(&ahead, &behind, STEP))
-    };
-    let slopes: Vec<Option<Residual>> = (0..COUNT).map(slope).collect();
-    let weighted = |of: &Residual| of.weighted(weights).collect::<Vec<[f64; 4]>>();
-    let columns: Vec<Vec<[f64; 4]>> =
-        slopes.par_iter().map(|slope| slope.as_ref().map_or(Vec::new(), weighted)).collect();
-    let own = weighted(here);
-    let product = |a: &[[f64; 4]], b: &[[f64; 4]]| -> f64 {
-        a.iter().zip(b).map(|(a, b)| (0..4).map(|k| a[k] * b[k]).sum::<f64>()).sum()
-    };
-    let curvature = Curvature::from_fn(|i, j| product(&columns[i], &columns[j]));
-    let gradient = Gradient::from_fn(|i, _| product(&columns[i], &own));
-    (curvature, gradient)
+/// By how many pixels the unknown moves that moves most.
+fn longest(by: &[f64; COUNT]) -> f64 {
+    by.iter().fold(0.0, |most, pixels| most.max(pixels.abs()))
 }
 
 /// The step that the normal equations ask for, damped; `None` where they are not finite.

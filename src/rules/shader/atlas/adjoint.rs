@@ -5,9 +5,9 @@
 
 use std::collections::BTreeSet;
 
-use super::buffers::{EACH_TEXEL, StoredTexels, Text, WEIGH};
+use super::buffers::{EACH_TEXEL, StoredTexels, Text};
 use super::columns::{Columns, by_weights};
-use super::kernel::{Loop, TAP, of_kernel, taps};
+use super::kernel::{TAP, of_kernel, taps};
 use super::layers::Layers;
 use super::tangent::Along;
 use super::{Axis, Level, Pass, PassKind, text};
@@ -17,7 +17,7 @@ use crate::shader::search::components;
 use crate::shader::tangent::TangentError;
 use crate::shader::tangent::chain::{Chain, Moved, Seed};
 
-const BLUR: &str = include_str!("blur_adjoint.wgsl");
+const BLUR: &str = concat!(include_str!("here_stored.wgsl"), include_str!("blur_adjoint.wgsl"));
 
 /// A pass backwards, as a compute shader of a thread a texel that the mesh covers.
 ///
@@ -170,12 +170,12 @@ fn blur(
 ) -> Result<PassAdjoint, TangentError> {
     let plan = &pass.plan;
     let (rule, source) = (plan.steps[0].rule, &plan.levels[0]);
-    let kernels = of_kernel(plan, rule);
-    if let Some(level) = kernels.iter().find(|level| moving.contains(&level.name)) {
+    if let Some(level) = of_kernel(plan, rule).iter().find(|level| moving.contains(&level.name)) {
         let what = format!("a blur whose kernel moves with {}", level.name);
         return Err(TangentError::Unsupported { function: rule.function.to_owned(), what });
     }
-    let Loop { before, reach, sides, tap, by_deviation } = taps(&plan.facts, rule, axis, uniform);
+    let kernel = taps(&plan.facts, rule, axis, uniform);
+    let by_deviation = &kernel.by_deviation;
     let mut columns = Columns { by_deviation: by_deviation.is_some(), ..Columns::default() };
     let (mut functions, mut moved) = (Vec::new(), Vec::new());
     for (k, seed) in seeds.iter().enumerate() {
@@ -194,25 +194,12 @@ fn blur(
         };
         moved.push(MovedLeaf { by: Mover::Seed(k), leaf: 0, value });
     }
-    let reads: String = kernels.iter().map(|level| text.read(&level.name, level)).collect();
-    let entry = BLUR
-        .replace("{weigh}", WEIGH)
-        .replace("{axis}", axis.step())
-        .replace("{source}", &text.level(&source.name))
-        .replace("{reads}", &format!("    let size = vec2i(SIZE);\n{reads}"))
-        .replace("{before}", &(before + &columns.before))
-        .replace("{sums}", &columns.sums)
-        .replace("{reach}", &reach)
-        .replace("{kernel}", &tap)
-        .replace("{slopes}", &columns.slopes)
-        .replace("{sides}", &sides.to_string())
-        .replace("{adds}", &columns.adds);
     Ok(PassAdjoint {
         plan: plan.clone(),
         leaves: pass.leaves.clone(),
         source: Some(source.name.clone()),
         moved,
         declarations: plan.declarations(true) + &functions.concat() + &text.head(),
-        entry,
+        entry: text.of_blur(BLUR, plan, axis, &kernel, &columns),
     })
 }

@@ -19,11 +19,12 @@ use crate::shader::search::components;
 use crate::shader::tangent::chain::Chain;
 
 const HEAD: &str = include_str!("head_buffers.wgsl");
-pub(super) const EACH_TEXEL: &str = include_str!("each_stored.wgsl");
+pub(super) const EACH_TEXEL: &str =
+    concat!(include_str!("here_stored.wgsl"), include_str!("each_stored.wgsl"));
 const NEIGHBOURS: &str = include_str!("neighbours_stored.wgsl");
 const BLUR: &str = include_str!("blur_stored.wgsl");
 /// What each texel that a blur reads weighs in its mean, and how that moves.
-pub(super) const WEIGH: &str = include_str!("weigh_stored.wgsl");
+const WEIGH: &str = include_str!("weigh_stored.wgsl");
 const FILL: &str = include_str!("fill_stored.wgsl");
 
 /// What a shader's threads take.
@@ -128,7 +129,7 @@ impl Text<'_> {
     }
 
     /// Where a level begins in the buffer.
-    pub(super) fn level(&self, name: &str) -> String {
+    fn level(&self, name: &str) -> String {
         let place = self.layers.place(name).unwrap_or(0);
         format!("{}u", place * self.texels.size as usize * self.texels.size as usize)
     }
@@ -223,16 +224,14 @@ impl Text<'_> {
         let (first, tangents) = (&group[0], &group[1..]);
         let plan = &first.pass.plan;
         let (rule, source) = (plan.steps[0].rule, &plan.levels[0]);
-        let Loop { before, reach, sides, tap, by_deviation } = taps(&plan.facts, rule, axis, uniform);
+        let kernel = taps(&plan.facts, rule, axis, uniform);
+        let by_deviation = &kernel.by_deviation;
         let mut columns = Columns { by_deviation: by_deviation.is_some(), ..Columns::default() };
         let mut functions: Vec<&str> = Vec::new();
         let mut reads = vec![source.name.clone()];
-        let kernels = of_kernel(plan, rule);
-        reads.extend(kernels.iter().map(|level| level.name.clone()));
-        if let Some(slope) = by_deviation.filter(|_| tangents.iter().any(|named| named.pass.moving.is_some()))
-        {
-            columns.share(&slope);
-        }
+        reads.extend(of_kernel(plan, rule).iter().map(|level| level.name.clone()));
+        let moves = tangents.iter().any(|named| named.pass.moving.is_some());
+        by_deviation.iter().filter(|_| moves).for_each(|slope| columns.share(slope));
         for (k, named) in tangents.iter().enumerate() {
             let moved = match &named.pass.moving {
                 Some(MovingKernel { blurred, slope }) => {
@@ -255,33 +254,45 @@ impl Text<'_> {
             let leaf = self.level(&named.name(&named.pass.leaves[0].name));
             columns.left(k, &leaf, moved.is_some(), named.pass.moving.is_some());
         }
-        let kernel_reads: String = kernels.iter().map(|level| self.read(&level.name, level)).collect();
-        let size = "    let size = vec2i(SIZE);\n";
         let leaf = self.level(&first.pass.leaves[0].name);
         let value = format!("    leave({leaf}, here, vec4f(middle.xyz + mean, middle.w));\n");
         let [_, own] = lines_of(axis);
         let body = BLUR
-            .replace("{weigh}", WEIGH)
             .replace("{own}", own)
-            .replace("{axis}", axis.step())
             .replace("{across}", axis.across().step())
-            .replace("{source}", &self.level(&source.name))
-            .replace("{reads}", &format!("{size}{kernel_reads}"))
-            .replace("{before}", &(before + &columns.before))
-            .replace("{sums}", &columns.sums)
-            .replace("{reach}", &reach)
-            .replace("{kernel}", &tap)
-            .replace("{slopes}", &columns.slopes)
-            .replace("{sides}", &sides.to_string())
-            .replace("{adds}", &columns.adds)
             .replace("{leaves}", &(value + &columns.leaves));
+        let body = self.of_blur(&body, plan, axis, &kernel, &columns);
         let wgsl = plan.declarations(true) + &functions.concat() + &self.head() + &body;
         let leaves = group.iter().flat_map(Named::leaves).map(|(name, _)| name).collect();
         LevelShader { plan: plan.clone(), over: Over::Tiles(axis), reads, leaves, wgsl }
     }
 
+    /// A blur's text with what its plan, its loop over taps and what moves say.
+    pub(super) fn of_blur(
+        &self,
+        text: &str,
+        plan: &Plan,
+        axis: Axis,
+        kernel: &Loop,
+        columns: &Columns,
+    ) -> String {
+        let levels = of_kernel(plan, plan.steps[0].rule);
+        let reads: String = levels.iter().map(|level| self.read(&level.name, level)).collect();
+        text.replace("{weigh}", WEIGH)
+            .replace("{axis}", axis.step())
+            .replace("{source}", &self.level(&plan.levels[0].name))
+            .replace("{reads}", &format!("    let size = vec2i(SIZE);\n{reads}"))
+            .replace("{before}", &format!("{}{}", kernel.before, columns.before))
+            .replace("{sums}", &columns.sums)
+            .replace("{reach}", &kernel.reach)
+            .replace("{kernel}", &kernel.tap)
+            .replace("{slopes}", &columns.slopes)
+            .replace("{sides}", &kernel.sides.to_string())
+            .replace("{adds}", &columns.adds)
+    }
+
     /// The line that reads a level's quantity at a texel.
-    pub(super) fn read(&self, name: &str, level: &Level) -> String {
+    fn read(&self, name: &str, level: &Level) -> String {
         let (place, swizzle) = (self.level(name), level.swizzle());
         format!("    let {}: {} = level_texel({place}, here).{swizzle};\n", level.name, level.kind)
     }

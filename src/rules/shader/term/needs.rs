@@ -8,6 +8,7 @@ use crate::model::effects::{Effect, Effects, Silhouette};
 use crate::model::evaluate::Setup;
 use crate::model::fields::{Field, Fields};
 use crate::model::needs::Needs;
+use crate::model::transmission::Method;
 use crate::shader::domain::{CHART, Domain, UV};
 use crate::shader::emit::{SAMPLE, UNMADE, parts};
 use crate::shader::facts::{Facts, Source};
@@ -54,8 +55,7 @@ pub(super) fn of_goals(goals: &[&'static str], setup: &Setup) -> Needs {
     let facts = Facts { setup: *setup, source: Source::Samples, ..Facts::default() };
     // What a sample can hold. The smooth normal is left to the rule that puts the base in its place, so that it is
     // wanted by those alone that cannot do with that.
-    let stand_in =
-        !setup.effects.has(Effect::KeyLight) && !setup.smooth_lookups() && !library::transmits(setup.effects);
+    let stand_in = !setup.effects.has(Effect::KeyLight) && !setup.smooth_lookups() && !by_far_side(setup);
     let bumped = setup.silhouette == Silhouette::Bumped;
     let held = |name: &str| !(name == "normal" && stand_in || name == "silhouette" && bumped);
     let held = |name: &str| held(name) && !(name == "silhouette" && setup.rim_of_corners());
@@ -125,4 +125,9 @@ mod tests {
             }
         }
     }
+}
+
+/// Whether light that comes through is looked up along -N.
+fn by_far_side(setup: &Setup) -> bool {
+    library::transmits(setup.effects) && setup.choices.transmission.method != Method::Gathered
 }

@@ -41,6 +41,7 @@ pub fn all() -> Vec<&'static dyn Axis> {
         &ways::NORMALS,
         &ways::REFLECTION,
         &ways::BOUNCES,
+        &ways::THROUGH,
         &diffusion::TAPS,
         &diffusion::LIGHT_MAP_SIZE,
         &diffusion::SEAMS,

@@ -7,6 +7,7 @@ use glam::Vec3;
 
 use crate::StudyError;
 use crate::bake::VertexOcclusion;
+use crate::bake::inward::FAR_LIGHT;
 use crate::bake::rays::RayMesh;
 use crate::bake::sky::{BENT_NORMAL, SKY_RATIO};
 use crate::model::fields::Field;
@@ -137,7 +138,9 @@ fn seen_of_sky(
 ) -> Result<Vec<VertexField>, SampleError> {
     let rays = RayMesh::of(mesh);
     let surface = PosedSurface::new(scene, mesh, &rays, &scene.mesh.morphs, bakes)?;
-    let of_sky = |field: &Field| [SKY_RATIO, BENT_NORMAL].contains(&field.name());
+    let of_sky = |field: &Field| {
+        [SKY_RATIO, BENT_NORMAL].contains(&field.name()) || field.name().starts_with(FAR_LIGHT)
+    };
     let fields = scene.needs().fields.iter().filter(of_sky);
     Ok(fields.map(|field| VertexField { field, numbers: surface.field_of_vertices(field) }).collect())
 }

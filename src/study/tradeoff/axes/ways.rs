@@ -9,6 +9,7 @@ use crate::model::choices::{
 };
 use crate::model::effects::Effect;
 use crate::model::texture_filter::TextureFilter;
+use crate::model::transmission::Method;
 use crate::reference::Difference;
 use crate::scene::Scene;
 use crate::tradeoff::axis::{Rates, SceneAxis, Setting, Sweep, mark_pareto};
@@ -169,6 +170,24 @@ pub(super) const REFLECTION: Ways = Ways {
         ("none", |scene| scene.choices.skin_reflection = SkinReflection::None),
         ("gathered", |scene| scene.choices.skin_reflection = SkinReflection::Gathered),
         ("rays", |scene| scene.choices.specular_visibility = SpecularVisibility::Rays),
+    ],
+};
+
+/// Light that comes through thin parts.
+pub(super) const THROUGH: Ways = Ways {
+    axis: "transmission",
+    title: "Light that comes through thin parts",
+    method: "Images with each place's own thickness and each light's own way inside, and with the light that rays inward gather where \
+             they leave, which is the reference. Seconds are those of baking, tracing and one pass, nothing cached.",
+    effects: &["transmission"],
+    idle: "the effect transmission is off",
+    ways: &[
+        // Of samples, shadow maps or not are one.
+        ("thickness", |scene| {
+            let method = &mut scene.choices.transmission.method;
+            *method = if *method == Method::Gathered { Method::Thickness } else { *method };
+        }),
+        ("gathered", |scene| scene.choices.transmission.method = Method::Gathered),
     ],
 };
 

@@ -9,6 +9,11 @@
 // sample_field: light_NAME_open: f32 = 1; share of the light NAME that nothing stops
 // sample_field: light_NAME_depth: f32 = 4000; millimetres to the surface that faces the light NAME
 // sample_field: light_NAME_far: f32 = 1; share of the light NAME that arrives at that surface
+// sample_field: light_NAME_far_light: vec3f = 0; what arrives of the light NAME where rays inward leave, weakened on the way
+// sample_field: light_NAME_far_light_0: vec3f = 0; what arrives of the light NAME where rays inward leave after 0, 0.1 and 0.2 mm
+// sample_field: light_NAME_far_light_1: vec3f = 0; what arrives of the light NAME where rays inward leave after 0.4, 0.8 and 1.5 mm
+// sample_field: light_NAME_far_light_2: vec3f = 0; what arrives of the light NAME where rays inward leave after 3, 5.5 and 10 mm
+// sample_field: light_NAME_far_light_3: vec3f = 0; what arrives of the light NAME where rays inward leave after 18, 32 and 50 mm
 
 // Unit vector towards the light.
 //

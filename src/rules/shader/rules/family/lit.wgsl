@@ -107,7 +107,7 @@ fn light_NAME_found_inside(light_NAME_depth: f32) -> f32 {
 //
 // gives: light_NAME_through
 // joins: transmission_lit
-// when: lights, transmission
+// when: lights, transmission, !gathered_through
 // uses: transmission
 // cost: 36
 fn light_NAME_through_skin(
@@ -121,4 +121,49 @@ fn light_NAME_through_skin(
 ) -> vec3f {
     let facing: f32 = 0.3183098861837907 * (max(dot(into_skin, light_NAME_toward), 0.0) * light_NAME_beyond);
     return light_NAME_color * (transmitted(light_NAME_inside, transmission_length) * (facing * light_NAME_irradiance));
+}
+
+// The same as it is gathered, told apart by distances inside (model::transmission::NODES), three to a field.
+//
+// gives: light_NAME_through
+// joins: transmission_lit
+// when: lights, transmission, gathered_through, !raster
+// uses: transmission
+// cost: 250
+fn light_NAME_gathered_through_skin(
+    light_NAME_far_light_0: vec3f,
+    light_NAME_far_light_1: vec3f,
+    light_NAME_far_light_2: vec3f,
+    light_NAME_far_light_3: vec3f,
+    light_NAME_irradiance: vec3f,
+    light_NAME_color: vec3f,
+    transmission_length: vec3f,
+) -> vec3f {
+    let sum_0: vec3f = vec3f(light_NAME_far_light_0.x);
+    let sum_1: vec3f = sum_0 + transmitted(0.1, transmission_length) * light_NAME_far_light_0.y;
+    let sum_2: vec3f = sum_1 + transmitted(0.2, transmission_length) * light_NAME_far_light_0.z;
+    let sum_3: vec3f = sum_2 + transmitted(0.4, transmission_length) * light_NAME_far_light_1.x;
+    let sum_4: vec3f = sum_3 + transmitted(0.8, transmission_length) * light_NAME_far_light_1.y;
+    let sum_5: vec3f = sum_4 + transmitted(1.5, transmission_length) * light_NAME_far_light_1.z;
+    let sum_6: vec3f = sum_5 + transmitted(3.0, transmission_length) * light_NAME_far_light_2.x;
+    let sum_7: vec3f = sum_6 + transmitted(5.5, transmission_length) * light_NAME_far_light_2.y;
+    let sum_8: vec3f = sum_7 + transmitted(10.0, transmission_length) * light_NAME_far_light_2.z;
+    let sum_9: vec3f = sum_8 + transmitted(18.0, transmission_length) * light_NAME_far_light_3.x;
+    let sum_10: vec3f = sum_9 + transmitted(32.0, transmission_length) * light_NAME_far_light_3.y;
+    let sum_11: vec3f = sum_10 + transmitted(50.0, transmission_length) * light_NAME_far_light_3.z;
+    return light_NAME_color * (sum_11 * light_NAME_irradiance);
+}
+
+// The same as a rasteriser has it of the vertices, weakened by the lengths that they were made with.
+//
+// gives: light_NAME_through
+// joins: transmission_lit
+// when: lights, transmission, gathered_through, raster
+// cost: 6
+fn light_NAME_vertices_through_skin(
+    light_NAME_far_light: vec3f,
+    light_NAME_irradiance: vec3f,
+    light_NAME_color: vec3f,
+) -> vec3f {
+    return light_NAME_color * (light_NAME_far_light * light_NAME_irradiance);
 }
