@@ -21,7 +21,7 @@ pub(crate) const OTHERS: &str = r#"["base_weight", "rim_weight", "rim_exponent",
 const LEVELS: &str = r#"["base_weight", "rim_weight", "rim_exponent", "specular_weight", "roughness", "gloss", "f0", "normal_strength", "diffusion_weight_1", "diffusion_weight_2", "diffusion_weight_3", "diffusion_radius_1", "diffusion_radius_2", "diffusion_radius_3"]"#;
 
 /// What is fitted: its row's name, and settings of the scene file.
-const CHOICES: [Choice; 11] = [
+const CHOICES: [Choice; 14] = [
     ("no scattering", &[("model.effects", WITHOUT), ("fit.free", OTHERS)]),
     ("`diffusion`", &[("model.effects", DIFFUSION), ("fit.free", LEVELS)]),
     ("`diffusion`, `transmission`", &[]),
@@ -33,6 +33,11 @@ const CHOICES: [Choice; 11] = [
         &[("diffusion", "{ unblurred = \"pixel\", light_map_size = 1024, ambient_normal = \"bumped\" }")],
     ),
     ("the same, `seams = \"joined\"`", &[("diffusion", "{ seams = \"joined\" }")]),
+    ("the same, light through thin parts `\"gathered\"`", &[GATHERED]),
+    (
+        "the same, `\"gathered\"`, `unblurred = \"pixel\"`",
+        &[GATHERED, ("diffusion", "{ unblurred = \"pixel\" }")],
+    ),
     (
         "no scattering, 16 lights, both by rays",
         &[WITHOUT_RAYS[0], WITHOUT_RAYS[1], RAYS[0], RAYS[1], RAYS[2]],
@@ -47,7 +52,19 @@ const CHOICES: [Choice; 11] = [
             RAYS[2],
         ],
     ),
+    (
+        "the same, and `\"gathered\"`",
+        &[
+            ("diffusion", "{ unblurred = \"pixel\", light_map_size = 1024, ambient_normal = \"bumped\" }"),
+            GATHERED,
+            RAYS[0],
+            RAYS[1],
+            RAYS[2],
+        ],
+    ),
 ];
+
+const GATHERED: (&str, &str) = ("transmission", "{ method = \"gathered\" }");
 
 const WITHOUT_RAYS: [(&str, &str); 2] = [("model.effects", WITHOUT), ("fit.free", OTHERS)];
 
