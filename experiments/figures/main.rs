@@ -67,6 +67,7 @@ const FILES: &[(&str, Measure)] = &[
     ("experiments/accuracy_vs_time/results.json", studies::tradeoff),
     ("experiments/accuracy_vs_time/light.json", ways::light),
     ("experiments/accuracy_vs_time/diffusion.json", ways::diffusion),
+    ("experiments/accuracy_vs_time/transmission.json", ways::transmission),
     ("experiments/accuracy_vs_time/blurs.json", blurs::measure),
     ("experiments/effects_cost/results.json", timings::effects_cost),
     ("experiments/effects_cost/card.json", timings::effects_cost_on_a_card),

@@ -23,17 +23,8 @@ const LIGHT: [&str; 12] = [
     "normal_filter",
     "shadows",
 ];
-const DIFFUSION: [&str; 9] = [
-    "taps",
-    "light_map_size",
-    "seams",
-    "ambient_normal",
-    "stretch",
-    "unblurred",
-    "combined",
-    "levels",
-    "transmission",
-];
+const DIFFUSION: [&str; 8] =
+    ["taps", "light_map_size", "seams", "ambient_normal", "stretch", "unblurred", "combined", "levels"];
 
 /// Plots of the forest that the page shows.
 const PLOTS: [&str; 5] = ["shadows", "sky_lights", "visibility", "specular_visibility", "rays"];
@@ -51,6 +42,11 @@ pub(crate) fn light(lab: &Lab) -> Result<Value> {
 /// experiments/accuracy_vs_time/diffusion.json.
 pub(crate) fn diffusion(lab: &Lab) -> Result<Value> {
     swept(lab, "full.toml", &SCATTERING, &DIFFUSION)
+}
+
+/// experiments/accuracy_vs_time/transmission.json.
+pub(crate) fn transmission(lab: &Lab) -> Result<Value> {
+    swept(lab, "full.toml", &SCATTERING, &["transmission"])
 }
 
 /// A table an axis: of each setting its errors and its time in each scene, at the constants of the scene's fit.
