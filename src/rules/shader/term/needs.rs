@@ -96,6 +96,11 @@ pub(super) fn of_goals(goals: &[&'static str], setup: &Setup) -> Needs {
     }
 }
 
+/// Whether light that comes through is looked up along -N.
+fn by_far_side(setup: &Setup) -> bool {
+    library::transmits(setup.effects) && setup.choices.transmission.method != Method::Gathered
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -125,9 +130,4 @@ mod tests {
             }
         }
     }
-}
-
-/// Whether light that comes through is looked up along -N.
-fn by_far_side(setup: &Setup) -> bool {
-    library::transmits(setup.effects) && setup.choices.transmission.method != Method::Gathered
 }
