@@ -10,7 +10,7 @@ use std::sync::LazyLock;
 use crate::{files, output};
 
 /// All that makes bakes of their inputs: another text may make others, so that old files are left alone.
-const SOURCES: [&str; 33] = [
+const SOURCES: [&str; 34] = [
     include_str!("baker.rs"),
     include_str!("between.rs"),
     include_str!("cache.rs"),
@@ -19,6 +19,7 @@ const SOURCES: [&str; 33] = [
     include_str!("gather_cache.rs"),
     include_str!("harmonics.rs"),
     include_str!("interreflection.rs"),
+    include_str!("inward.rs"),
     include_str!("lobe_kernel.rs"),
     include_str!("lobe_sky.rs"),
     include_str!("lobes.rs"),
