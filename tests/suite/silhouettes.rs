@@ -231,7 +231,7 @@ fn displaced_and_turned_cameras_are_noticed_on_path_traced_heads() {
             DMat4::from_rotation_x(-turn),
         ];
         for i in 0..loaded.scene.views.len() {
-            // The others take as long, and nothing is said of them.
+            // Alone: the others would be drawn again each time.
             let mut loaded = loaded.clone();
             loaded.scene.views = vec![loaded.scene.views.swap_remove(i)];
             for motion in motions {

@@ -481,6 +481,31 @@ fn the_renderer_draws_what_the_processor_does_by_every_method() {
     }
 }
 
+/// What vertices hold is weakened by the lengths that are set, and shows.
+#[test]
+fn a_renderer_takes_gathered_light_of_other_lengths() {
+    let Some(gpu) = gpu() else { return };
+    let baked = head_by(Method::Gathered, 24);
+    let camera = baked.scene.views[0].camera;
+    let mut renderer = Renderer::new(gpu, Content::of(&baked), EXACT).unwrap();
+    let mut drawn = |baked: &Baked| {
+        renderer.set_params(&baked.scene.params).unwrap();
+        renderer.render(&camera, 1.0).unwrap().image
+    };
+    let longer =
+        baked.clone().with_scene(|scene| scene.params.set_rgb(param("transmission_length"), [9.0, 5.0, 3.0]));
+    let without = baked.clone().with_scene(|scene| scene.params.set(param("transmission_weight"), 0.0));
+    let images = [&baked, &longer, &without].map(|baked| (drawn(baked), on_cpu(baked)));
+    let interior = |a: &Image, b: &Image| Difference::new(a, b, 4).interior;
+    for (got, want) in &images {
+        // As above: half of the pixels face the light. Gathered light is of vertices on both sides.
+        assert!(bench::quantile(&interior(want, got), 0.5) < 1e-4);
+    }
+    for other in [1, 2] {
+        assert!(bench::quantile(&interior(&images[0].0, &images[other].0), 0.5) > 1e-3, "{other}");
+    }
+}
+
 #[test]
 fn the_table_is_read_and_what_it_lacks_is_told() {
     let folder = SceneFolder::new();

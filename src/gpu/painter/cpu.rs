@@ -8,6 +8,7 @@ use web_time::Instant;
 use super::{BACKGROUND, Beside, Cut, PaintError, Painter, Painting, Picture};
 use crate::bake::PoseBake;
 use crate::bake::interreflection::VertexGather;
+use crate::bake::inward::InwardRays;
 use crate::bake::lobe_sky::LobeSky;
 use crate::bake::rays::RayMesh;
 use crate::bake::sky::traces_lobes;
@@ -69,12 +70,13 @@ impl CpuPainter {
 
     /// The mesh as it is posed, with what is baked of it.
     fn surface(&self) -> Result<PosedSurface<'_>, PaintError> {
-        let Pose { mesh, rays, morphs, own, gather } = &self.pose;
+        let Pose { mesh, rays, morphs, own, gather, inward } = &self.pose;
         let bakes = SurfaceBakes {
             occlusion: own.occlusion.as_ref().or(self.baked.occlusion.as_deref()),
             sky: own.sky.as_ref().or(self.baked.sky.as_deref()),
             thickness: own.thickness.as_ref().or(self.baked.thickness.as_deref()),
             gather: gather.as_ref(),
+            inward: inward.as_ref(),
             // A turn's frames would fill the folder with poses of their own.
             cache: None,
             lobe_sky: self.lobe_sky.as_ref(),
@@ -91,15 +93,16 @@ struct Pose {
     morphs: Vec<Morph>,
     own: PoseBake,
     gather: Option<VertexGather>,
+    inward: Option<InwardRays>,
 }
 
 impl Pose {
     fn of(scene: &Scene, mesh: &Mesh, own: Option<PoseBake>) -> Self {
         let posed = mesh.pose();
         let rays = RayMesh::of(&posed);
-        let gather = gather_of(scene, &posed);
+        let (gather, inward) = (gather_of(scene, &posed), InwardRays::of_scene(scene, &posed));
         let (morphs, own) = (mesh.morphs.clone(), own.unwrap_or_default());
-        Self { mesh: posed, rays, morphs, own, gather }
+        Self { mesh: posed, rays, morphs, own, gather, inward }
     }
 }
 

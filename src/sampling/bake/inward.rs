@@ -43,7 +43,7 @@ struct Exit {
 }
 
 /// Where rays from the vertices of a mesh leave it.
-pub(crate) struct InwardRays {
+pub struct InwardRays {
     vertices: VertexRays,
     exits: Vec<Box<[Exit]>>,
     /// What a ray counts.
@@ -53,9 +53,23 @@ pub(crate) struct InwardRays {
 /// What arrives from each of the [`NODES`], `C` numbers each.
 pub(crate) type OfNodes<const C: usize> = [[f32; C]; NODES.len()];
 
+impl std::fmt::Debug for InwardRays {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("InwardRays").field("vertices", &self.exits.len()).finish_non_exhaustive()
+    }
+}
+
 impl InwardRays {
+    /// Of a scene's mesh as it is posed, where light is gathered inside it: whoever makes samples of one pose again and again
+    /// keeps it. All cores.
+    #[must_use]
+    pub fn of_scene(scene: &Scene, mesh: &PosedMesh) -> Option<Self> {
+        let unit = 1e3 * scene.metres_per_unit;
+        gathers_inside(scene).then(|| Self::new(mesh, scene.quality.occlusion_rays, unit))
+    }
+
     /// Of a mesh as it is posed, by `rays` rays a vertex; `unit` millimetres are a unit of it. All cores.
-    pub(crate) fn new(mesh: &PosedMesh, rays: u32, unit: f64) -> Self {
+    fn new(mesh: &PosedMesh, rays: u32, unit: f64) -> Self {
         let vertices = VertexRays::inward(&|_| mesh.clone().without_open(), 0, rays, 1.0);
         let bar = progress::bar("light inside", vertices.len() as u64);
         let exits = vertices.at_rest(|_, rays, found: Vec<Nearest>| {

@@ -44,30 +44,33 @@ impl Asked {
 }
 
 /// What finds those of `fields` that are of gathered light; `sky` is what arrives of the environment. A light that a parameter
-/// has moved stands there; what is found is held while parameters move.
+/// has moved stands there; what is found is held while parameters move. Without a sky none of it comes through; `known` are rays
+/// that have been traced already.
 pub(super) fn supplies<'a>(
     scene: &Scene,
-    mesh: &'a PosedMesh,
-    rays: &RayMesh,
+    (mesh, rays): (&'a PosedMesh, &RayMesh),
     sky: Option<&Sky<'a>>,
+    known: Option<&InwardRays>,
     fields: Fields,
 ) -> Supplies<'a> {
     let environment = Asked::of(fields, "", 1);
+    let sky = sky.filter(|_| !environment.is_none());
     let shining = scene.effects.has(Effect::Lights);
     let lights = if shining { scene.lights_at(&scene.params) } else { Vec::new() };
     let of_light = |light: &Light| Asked::of(fields, &format!("light_{}_", light.member()), TOGETHER);
     let lights: Vec<(Light, Asked)> =
         lights.into_iter().map(|light| (light.clone(), of_light(&light))).collect();
-    if environment.is_none() && lights.iter().all(|(_, asked)| asked.is_none()) {
+    if sky.is_none() && lights.iter().all(|(_, asked)| asked.is_none()) {
         return Vec::new();
     }
-    let inward = InwardRays::new(mesh, scene.quality.occlusion_rays, 1e3 * scene.metres_per_unit);
+    let own = if known.is_none() { InwardRays::of_scene(scene, mesh) } else { None };
+    let Some(inward) = known.or(own.as_ref()) else { return Vec::new() };
     let of_vertices = |numbers: Vec<[f32; 3]>| -> Box<dyn Supply + 'a> {
         Box::new(OfVertices { triangles: &mesh.triangles, numbers })
     };
     let weakened = weakened(scene);
     let mut supplies: Supplies<'a> = Vec::new();
-    if let Some(sky) = sky.filter(|_| !environment.is_none()) {
+    if let Some(sky) = sky {
         let gathered = inward.gathered(|vertex| sky.light(vertex).map(|light| light.max(0.0) as f32));
         let node = |node: usize| of_vertices(gathered.iter().map(|of| of[node]).collect());
         supplies.extend(environment.nodes.into_iter().map(|(field, first)| (field, node(first))));

@@ -15,6 +15,7 @@ use super::surface::NORMAL_SPREAD;
 use super::trace::Hit;
 use super::{SampleError, bounced, far_light, lit, posed_occlusion, sky, through};
 use crate::bake::interreflection::VertexGather;
+use crate::bake::inward::InwardRays;
 use crate::bake::lobe_sky::LobeSky;
 use crate::bake::rays::RayMesh;
 use crate::bake::sky::{SKIN_SEEN, sees_skin, traces_lobes};
@@ -36,6 +37,8 @@ pub struct SurfaceBakes<'a> {
     pub thickness: Option<&'a VertexThickness>,
     /// What its vertices gather of one another ([`super::gather_of`]), where it is known already.
     pub gather: Option<&'a VertexGather>,
+    /// Where rays inward from its vertices leave it, where it is known already.
+    pub inward: Option<&'a InwardRays>,
     /// The folder of the bakes that are kept: of what vertices gather, too.
     pub cache: Option<&'a Path>,
     /// The environment as specular lobes see it by rays, where it is known already.
@@ -121,7 +124,7 @@ impl<'a> PosedSurface<'a> {
         supplies.extend(through::supplies(scene, mesh, rays, morphs, (bakes.thickness, fields))?);
         let mut lit = None;
         let sky = bakes.sky.map(|bake| Sky::new(scene, mesh, morphs, bake)).transpose()?;
-        supplies.extend(far_light::supplies(scene, mesh, rays, sky.as_ref(), fields));
+        supplies.extend(far_light::supplies(scene, (mesh, rays), sky.as_ref(), bakes.inward, fields));
         if let Some((sky, bake)) = sky.zip(bakes.sky) {
             supplies.extend(sky::supplies(scene, rays, &sky, (bake, gather), fields));
             let gather = gather.filter(|_| sees_skin(scene, fields));

@@ -12,6 +12,7 @@ use super::hard::{HardLight, Place, Sky};
 use super::lights::{LightBox, LightKind};
 use super::random::{fragment, one_of, parameter, share, unit};
 use super::reference::{Moves, moved, moved_params};
+use crate::bake::inward::FAR_LIGHT;
 use crate::bake::reflected::ReflectedStack;
 use crate::bake::{Illumination, LobeStack};
 use crate::model::choices::{
@@ -323,6 +324,8 @@ fn found(name: &str, at: &FragmentInputs, rng: &mut StdRng) -> [f32; 3] {
         "lobe_nodes" if rng.random_range(0..6) == 0 => [0.0; 3],
         "lobe_nodes" => [0.2, 0.4, 0.8],
         name if name == "thickness" || name.ends_with("_depth") => three(depth(rng)),
+        // Shares of a cubic may be below 0.
+        name if name.contains(FAR_LIGHT) => std::array::from_fn(|_| share(rng).signum() * bright(rng)),
         // Distances, radiance, shares of light.
         _ => std::array::from_fn(|_| bright(rng)),
     };

@@ -18,7 +18,8 @@ const SETTLED: f64 = 0.01;
 /// And one further than this is cut short: beyond, images are no lines of the unknowns.
 const FARTHEST: f64 = 4.0;
 /// Steps that are taken by their slopes alone, once none lowers the loss: coverage counts whole samples, so that near its
-/// minimum the loss is rougher than it is curved, while slopes over some pixels are means over thousands of borders.
+/// minimum the loss is rougher than it is curved, while slopes are sums over thousands of borders. Cameras that are known end
+/// nearer by them.
 const POLISHING: usize = 12;
 /// The loss may rise by this share of it in them.
 const ROUGHNESS: f64 = 0.01;
