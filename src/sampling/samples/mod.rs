@@ -6,7 +6,7 @@
 //! `group * LANES + lane`. Groups with equally many records stand together, so that silhouettes (few
 //! samples) cost no padding inside.
 //!
-//! - `trace`: primary rays, and what they hit; `raster`: the same of a pinhole and skin alone, triangle by triangle
+//! - `trace`: primary rays, and what they hit (`hit`); `raster`: the same of a pinhole and skin alone, triangle by triangle
 //! - `posed`: the mesh in a pose with what is baked of it; `supply`: what finds fields of samples, `lit`: what reaches
 //!   them of lights, `bounced`: what the skin throws back of these, `sky`: what they see of the sky, `sky_rays`: by
 //!   rays; `lit_mesh`: the mesh as a source of light, `skin`: what it sees of itself; `surface`: frames, silhouette and
@@ -33,6 +33,7 @@ mod dilation;
 mod far_light;
 mod footprint;
 mod group;
+mod hit;
 mod lit;
 mod lit_mesh;
 mod lobe;

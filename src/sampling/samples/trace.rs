@@ -1,58 +1,16 @@
 //! Primary rays: which point of the mesh each stratified sample of each pixel sees. Those of a pinhole that end at the first
 //! surface find it triangle by triangle (`raster`), the others by a hierarchy.
 
-use glam::{DVec3, Vec2, Vec3, Vec3A};
+use glam::{DVec3, Vec3A};
 use rayon::prelude::*;
 
+pub use super::hit::Hit;
 use super::raster::{Raster, Scratch};
 use crate::bake::low_discrepancy::mix;
 use crate::bake::rays::RayMesh;
 use crate::scene::mesh::PosedMesh;
 use crate::scene::plain::{PlainMaterial, PlainParts};
 use crate::scene::view::Camera;
-
-/// A point of the mesh: a triangle, and the weights of its second and third vertex.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hit {
-    /// The triangle.
-    pub triangle: u32,
-    /// The weights of its second and third vertex.
-    pub barycentric: [f32; 2],
-}
-
-impl Hit {
-    /// The weights of the three vertices.
-    #[must_use]
-    pub fn weights(&self) -> [f32; 3] {
-        let [u, v] = self.barycentric;
-        [1.0 - u - v, u, v]
-    }
-
-    /// The texture coordinates there; 0 where the mesh has none.
-    #[must_use]
-    pub fn uv(&self, mesh: &PosedMesh) -> Vec2 {
-        self.mean(mesh, &mesh.uvs)
-    }
-
-    /// Those by which the mesh lies in the UV atlas.
-    pub(super) fn atlas_uv(&self, mesh: &PosedMesh) -> Vec2 {
-        self.mean(mesh, mesh.atlas_uvs())
-    }
-
-    /// Where the mesh is there.
-    pub(super) fn place(&self, mesh: &PosedMesh) -> Vec3 {
-        let corners = mesh.triangles[self.triangle as usize];
-        self.weights().into_iter().zip(corners).map(|(weight, i)| weight * mesh.positions[i as usize]).sum()
-    }
-
-    fn mean(&self, mesh: &PosedMesh, uvs: &[Vec2]) -> Vec2 {
-        if uvs.is_empty() {
-            return Vec2::ZERO;
-        }
-        let corners = mesh.triangles[self.triangle as usize];
-        self.weights().into_iter().zip(corners).map(|(weight, i)| weight * uvs[i as usize]).sum()
-    }
-}
 
 /// What a view sees: the pixels that show the mesh, and their hits.
 #[derive(Default)]
